@@ -1,0 +1,241 @@
+"""The command line: `python -m core reconstruct SCAN -o OUT` and `python -m core info SCAN`."""
+
+import argparse
+import signal
+import sys
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+from tqdm import tqdm
+
+from .errors import Cancelled, MissingDependency, SettingsError, VADError
+from .field.grid import fit_grid
+from .io.atomic import writable_folder
+from .io.ply import write_mesh, write_points
+from .io.points import READERS, read_points
+from .io.report import report_json, write_report
+from .io.vdb import write_vdb
+from .pipeline import reconstruct
+from .points import prepare_samples
+from .reconstruction import Reconstruction
+from .settings import Settings, options
+
+PROGRAM = "python -m core"
+_BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
+DONE, BAD_INPUT, CANCELLED = 0, 2, 130
+
+_DESCRIPTION = "Reconstruct a surface from a point cloud without normals: distance field, mesh and normals."
+_EXAMPLE = f"""\
+example:
+  {PROGRAM} info bunny.ply
+  {PROGRAM} reconstruct bunny.ply -o out --resolution 256
+
+exit status:
+  0    done
+  2    the scan, an option or the output folder cannot be used: one line on stderr says what and how to help it
+  130  cancelled by Ctrl-C; no file is left half-written
+
+With --json, stdout holds one JSON document and nothing else: the report, or {{"error": "..."}} beside the line on
+stderr.
+"""
+_OUTPUTS = """\
+files in the folder OUT, named after the scan, each written whole or not at all:
+  SCAN.vdb         OpenVDB grids: udf (distance to the surface) and density (fog to look at)
+  SCAN_double.ply  mesh: the closed two-sided cover of the surface (not with --surface none)
+  SCAN_points.ply  the samples used, with normals (unit axes, the sign is arbitrary) and confidence
+  SCAN.json        settings, counts, seconds, warnings; written last
+All are in the scan's own units and place.
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line on `arguments` (default: those of the process) and return the exit status."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        given = _parser().parse_args(arguments)
+        given.run(given)
+        return DONE
+    except Cancelled as error:
+        return _fail(error, CANCELLED, arguments)
+    except VADError as error:
+        return _fail(error, BAD_INPUT, arguments)
+    except KeyboardInterrupt:
+        return _fail("cancelled", CANCELLED, arguments)
+
+
+def _fail(error, status, arguments):
+    line = " ".join(str(error).split())
+    print(f"error: {line}", file=sys.stderr)
+    if "--json" in arguments:
+        print(report_json({"error": line}))
+    return status
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, like every other error, rather than with a dump of the usage."""
+
+    def error(self, message):
+        raise SettingsError(f"{message}; see {self.prog} --help")
+
+
+def _parser():
+    layout = argparse.RawDescriptionHelpFormatter
+    parser = _Parser(
+        prog=PROGRAM, description=_DESCRIPTION, epilog=_EXAMPLE, formatter_class=layout, allow_abbrev=False
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    formats = f"point cloud: {', '.join(READERS)}"
+
+    text = "reconstruct one scan and write volume, mesh, points and report"
+    command = commands.add_parser(
+        "reconstruct", help=text, description=text, epilog=_OUTPUTS, formatter_class=layout, allow_abbrev=False
+    )
+    command.add_argument("scan", metavar="SCAN", type=Path, help=formats)
+    command.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="folder for the results")
+    _add_settings(command, options())
+    command.add_argument("--gradient", action="store_true", help="also write the grid gradient into SCAN.vdb")
+    command.add_argument("--json", action="store_true", help="print the report and the files written as JSON")
+    command.set_defaults(run=_reconstruct)
+
+    text = "say what a scan holds and how large a cell would be"
+    command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
+    command.add_argument("scan", metavar="SCAN", type=Path, help=formats)
+    _add_settings(command, {"resolution": options()["resolution"]})
+    command.add_argument("--json", action="store_true", help="print as JSON")
+    command.set_defaults(run=_info)
+    return parser
+
+
+def _add_settings(parser, fields):
+    """An option for each field of Settings; what it may be is checked by Settings alone."""
+    for name, field in fields.items():
+        limits, choices, unit = (field.metadata[key] for key in ("limits", "choices", "unit"))
+        allowed = f"one of {', '.join(choices)}" if choices else f"{limits[0]} to {limits[1]} {unit}".strip()
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            metavar=field.type.__name__.upper(),
+            type=_number if field.type in (int, float) else field.type,
+            default=field.default,
+            help=f"{field.metadata['help']} ({allowed}; default {field.default})".replace("%", "%%"),
+        )
+
+
+def _number(text):
+    """A number where `text` is one; else the text, for Settings to refuse."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _reconstruct(given):
+    settings = Settings(**{name: getattr(given, name) for name in options()})
+    points = read_points(given.scan)
+    folder = writable_folder(given.output)
+    with _progress() as progress:
+        result = reconstruct(points, settings, progress=progress)
+    report = _write(result, folder, given.scan, given.gradient)
+    for warning in report["warnings"]:
+        print(f"warning: {warning}", file=sys.stderr)
+    print(report_json(report) if given.json else _summary(report))
+
+
+@contextmanager
+def _progress():
+    """A progress callback that draws a bar where stderr is a terminal, and cancels after the first Ctrl-C.
+
+    The second Ctrl-C stops at once, as it would any Python program.
+    """
+    pressed = []
+
+    def interrupt(signum, frame):
+        pressed.append(signum)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def report(fraction, text):
+        if not bar.disable:
+            bar.set_description_str(text, refresh=text != bar.desc)
+            bar.update(fraction - bar.n)
+        return not pressed
+
+    previous = signal.signal(signal.SIGINT, interrupt)
+    try:
+        with tqdm(total=1.0, bar_format=_BAR, miniters=0, disable=None, leave=False) as bar:
+            yield report
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def _write(result: Reconstruction, folder, scan, gradient):
+    """Write every file; the report, which lists them, goes last. Returns the report."""
+    samples = dict(points=result.points, normals=result.normals, confidence=result.confidence)
+    writers = {
+        "_points.ply": partial(write_points, **samples),
+        ".vdb": partial(write_vdb, field=result.field, gradient=gradient),
+    }
+    if result.surface is not None:
+        writers["_double.ply"] = partial(write_mesh, mesh=result.surface)
+
+    summary = folder / f"{scan.stem}.json"
+    report = {**result.report, "scan": scan, "files": [], "warnings": list(result.report["warnings"])}
+    for ending, write in writers.items():
+        path = folder / f"{scan.stem}{ending}"
+        try:
+            write(path)
+            report["files"].append(path)
+        except MissingDependency as error:
+            report["warnings"].append(f"{path} is not written: {error}")
+    report["files"].append(summary)
+    write_report(summary, report)
+    return report
+
+
+def _summary(report):
+    """What a person wants to know after a run."""
+    return "\n".join(
+        [
+            f"{report['counts']['samples']} samples reconstructed in {sum(report['seconds'].values()):.1f} s",
+            *(f"wrote {path}" for path in report["files"]),
+        ]
+    )
+
+
+def _info(given):
+    resolution = Settings(resolution=given.resolution).resolution
+    points = read_points(given.scan)
+    samples = prepare_samples(points)
+    nearest = KDTree(samples.points).query(samples.points, k=2, workers=-1)[0][:, 1] * samples.scale
+    used = points[samples.source_index]
+    finite = int(np.isfinite(points).all(axis=1).sum())
+    low, high = used.min(axis=0), used.max(axis=0)
+    grid = fit_grid(used, resolution)
+    facts = {
+        "scan": given.scan,
+        "points": len(points),
+        "not_finite": len(points) - finite,
+        "duplicates": finite - len(used),
+        "box": {"low": low, "high": high, "size": high - low},
+        "spacing": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
+        "resolution": resolution,
+        "cell": grid.spacing,
+        "grid": grid.shape,
+    }
+    print(report_json(facts) if given.json else _described(facts))
+
+
+def _described(facts):
+    box, spacing = facts["box"], facts["spacing"]
+    low, high, size = (" ".join(f"{x:.6g}" for x in box[key]) for key in ("low", "high", "size"))
+    shape = " x ".join(map(str, facts["grid"]))
+    return (
+        f"points   {facts['points']}, of which {facts['not_finite']} not finite and {facts['duplicates']} duplicates\n"
+        f"box      {low} to {high}, size {size}\n"
+        f"spacing  {spacing['median']:.3g} to the nearest neighbour (median; "
+        f"{spacing['smallest']:.3g} to {spacing['largest']:.3g})\n"
+        f"cell     {facts['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes"
+    )

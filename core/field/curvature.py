@@ -1,0 +1,57 @@
+"""Bending of the surface at each sample, from its neighbours' positions and normals."""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+NEIGHBOURS = 16
+_WIDTH = 1.5  # of the Gaussian weight, local spacings
+_ALIGNED = 0.5  # least |n_i . n_j| of neighbours that count
+_STIFFNESS = 1e-3
+
+
+def tangent_frames(normals: np.ndarray) -> np.ndarray:
+    """Two unit tangents at each sample, (n,3) -> (n,2,3)."""
+    helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normals, first)], axis=1)
+
+
+def bending(points, normals, frames, spacing, tree: KDTree) -> np.ndarray:
+    """Second fundamental forms as tensors B, (n,3,3) float64: the surface near a sample has height l.B.l / 2 above the
+    tangent plane at tangential offset l.
+
+    Weighted least squares over the 16 nearest samples, each giving its height and, through its normal turned to agree
+    with the sample's, the slope there (three equations each). Curvatures are limited to one per local spacing.
+    """
+    k = min(NEIGHBOURS, len(points) - 1)
+    neighbours = tree.query(points, k=k + 1, workers=-1)[1][:, 1:]
+    step = points[neighbours] - points[:, None]
+    z = np.einsum("nki,ni->nk", step, normals)
+    x, y = np.moveaxis(np.einsum("nki,nai->nka", step, frames), 2, 0)
+    agreement = np.einsum("nki,ni->nk", normals[neighbours], normals)
+    tilt = np.einsum("nki,nai->nka", normals[neighbours], frames)
+    counted = np.abs(agreement) > _ALIGNED
+    slope = -tilt / np.where(counted, agreement, 1.0)[..., None]
+    squared = np.einsum("nki,nki->nk", step, step)
+    weight = np.where(counted, np.exp(-squared / (_WIDTH * spacing[:, None]) ** 2), 0.0)
+
+    zero = np.zeros_like(x)
+    distance = np.sqrt(squared)
+    equations = (
+        (np.stack([x * x, 2 * x * y, y * y], axis=2) / distance[..., None], 2 * z / distance),
+        (np.stack([x, y, zero], axis=2), slope[..., 0]),
+        (np.stack([zero, x, y], axis=2), slope[..., 1]),
+    )
+    matrix = _STIFFNESS * (spacing**2)[:, None, None] * np.eye(3)
+    right = np.zeros((len(points), 3))
+    for row, value in equations:
+        weighted = row * weight[..., None]
+        matrix = matrix + weighted.transpose(0, 2, 1) @ row
+        right += np.einsum("nka,nk->na", weighted, value)
+    xx, xy, yy = np.linalg.solve(matrix, right[..., None])[..., 0].T
+
+    size = np.sqrt(xx**2 + 2 * xy**2 + yy**2)
+    shrink = np.minimum(1.0, 1.0 / np.maximum(size * spacing, np.finfo(float).tiny))
+    form = np.stack([np.stack([xx, xy], axis=1), np.stack([xy, yy], axis=1)], axis=1) * shrink[:, None, None]
+    return np.einsum("nab,nai,nbj->nij", form, frames, frames)

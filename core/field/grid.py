@@ -1,0 +1,37 @@
+"""The regular grid that carries the field."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+PADDING = 0.125  # of the object's longest side, on every side
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Nodes ``origin + spacing * (i,j,k)``, 0 <= (i,j,k) < shape."""
+
+    origin: np.ndarray
+    spacing: float
+    shape: tuple[int, int, int]
+
+    def positions(self, flat_index: np.ndarray) -> np.ndarray:
+        """Coordinates of nodes given by their index in the flattened (C order) array, (m,) -> (m,3) float64."""
+        return self.origin + self.spacing * np.stack(np.unravel_index(flat_index, self.shape), axis=1)
+
+    def nearest_nodes(self, x: np.ndarray) -> np.ndarray:
+        """Flat index of the node nearest to each point inside the box, (m,3) -> (m,)."""
+        cells = np.rint((x - self.origin) / self.spacing).astype(np.int64)
+        return np.ravel_multi_index(cells.T, self.shape)
+
+
+def fit_grid(points: np.ndarray, resolution: int) -> Grid:
+    """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
+    longest side, as many as needed along the others."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    padding = PADDING * (high - low).max()
+    sides = high - low + 2 * padding
+    spacing = float(sides.max() / resolution)
+    cells = np.ceil(sides / spacing - 1e-9).astype(int)
+    origin = low - padding - 0.5 * (cells * spacing - sides)
+    return Grid(origin, spacing, tuple(int(c) + 1 for c in cells))

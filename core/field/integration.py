@@ -1,0 +1,100 @@
+"""From the local surface to distances in the whole box.
+
+Near the surface the blended projection distance is accurate and is kept. Further out the distance is carried from
+the foot points of the near nodes: every node takes the foot of the nearest such node (an exact Euclidean distance
+transform finds it), compares it with the feet its neighbours hold, and keeps the closest (vector distance
+propagation; P.-E. Danielsson, Computer Graphics and Image Processing 14, 1980).
+"""
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from ..progress import Progress
+from .borders import DISC
+from .grid import Grid
+from .local_surface import LocalSurface
+
+BAND = 2.0  # cells, where the projection distance itself is kept
+_SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
+_SETTLED = 0.1  # cells, residual of a foot point that counts
+_FOOT_RADIUS = 0.6  # cells, a foot point stands for a disc of this radius
+_ROUNDS = 2
+_SLAB = 1 << 18  # nodes
+
+
+def integrate(surface: LocalSurface, grid: Grid, progress=None) -> np.ndarray:
+    """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples."""
+    progress = Progress.of(progress)
+    node = _near_samples(surface, grid)
+    near = surface.project(grid.positions(node), progress.part(0.05, 0.6))
+    inside = near.distance <= BAND * grid.spacing
+    node, near = node[inside], near[inside]
+    values = _transport(grid, *_settled_feet(surface, grid, node, near, progress.part(0.6, 0.8)), progress.part(0.8, 1.0))
+    values.flat[node] = near.distance
+    return values
+
+
+def _near_samples(surface, grid):
+    """Flat index of every node that may lie within the band of the patches."""
+    reach = np.maximum(DISC * surface.spacing, surface.rims.reach) / grid.spacing
+    home = grid.nearest_nodes(surface.points)
+    reach_at = np.full(grid.shape, -1.0, np.float32)
+    np.maximum.at(reach_at.reshape(-1), home, reach.astype(np.float32))
+    distance, nearest = distance_transform_edt(reach_at < 0, return_indices=True)
+    return np.flatnonzero(distance <= BAND + 0.5 * np.sqrt(3) + reach_at[tuple(nearest)])
+
+
+def _settled_feet(surface, grid, node, near, progress):
+    """Nodes close to the surface, (s,), their foot points that survive a second projection, (s,3), the unit normal
+    there, (s,3), and the radius for which a foot point stands: 0 on rims, (s,)."""
+    seed = near.distance <= _SEED_BAND * grid.spacing
+    node, near = node[seed], near[seed]
+    feet = grid.positions(node) - near.step
+    again = surface.project(feet, progress)
+    kept = again.distance <= _SETTLED * grid.spacing
+    node, near, feet = node[kept], near[kept], feet[kept] - again.step[kept]
+    normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
+    return node, feet, normals, np.where(near.past_rim, 0.0, _FOOT_RADIUS * grid.spacing)
+
+
+def _transport(grid, node, feet, normals, radius, progress):
+    row = np.full(grid.shape, -1, np.int32)
+    row.flat[node] = np.arange(len(node), dtype=np.int32)
+    nearest = distance_transform_edt(row < 0, return_distances=False, return_indices=True)
+    row = row[tuple(nearest)]
+    del nearest
+    discs = feet.astype(np.float32), normals.astype(np.float32), radius.astype(np.float32)
+    x = [(grid.origin[a] + grid.spacing * np.arange(grid.shape[a])).astype(np.float32) for a in range(3)]
+    values = np.empty(grid.shape, np.float32)
+    thickness = max(1, _SLAB // (grid.shape[1] * grid.shape[2]))
+    for turn in range(_ROUNDS):
+        held = row.copy()
+        for first in range(0, grid.shape[0], thickness):
+            progress((turn + first / grid.shape[0]) / _ROUNDS)
+            slab = slice(first, min(first + thickness, grid.shape[0]))
+            at = np.stack(np.meshgrid(x[0][slab], x[1], x[2], indexing="ij"), axis=-1)
+            best = _distance_to_discs(at, *discs, row[slab])
+            for other in _neighbours(row, slab):
+                distance = _distance_to_discs(at, *discs, other)
+                closer = distance < best
+                best[closer] = distance[closer]
+                held[slab][closer] = other[closer]
+            values[slab] = best
+        row = held
+    return values
+
+
+def _distance_to_discs(x, centres, normals, radius, row):
+    """Distance to the disc that each foot point stands for."""
+    offset = x - centres[row]
+    height = np.einsum("...i,...i->...", offset, normals[row])
+    lateral = np.sqrt(np.maximum(np.einsum("...i,...i->...", offset, offset) - height**2, 0))
+    return np.hypot(height, np.maximum(lateral - radius[row], 0))
+
+
+def _neighbours(row, slab):
+    """What the six neighbours of the slab's nodes hold; a node at the edge of the box is its own neighbour."""
+    for axis in range(3):
+        for shift in (-1, 1):
+            index = np.clip(np.arange(row.shape[axis]) + shift, 0, row.shape[axis] - 1)
+            yield row[index[slab]] if axis == 0 else np.take(row[slab], index, axis=axis)

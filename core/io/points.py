@@ -1,0 +1,57 @@
+"""Points from files."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .read_numpy import read_npy, read_npz
+from .read_ply import read_ply
+from .read_text import read_obj, read_text
+
+READERS = {
+    ".ply": read_ply,
+    ".xyz": read_text,
+    ".pts": read_text,
+    ".txt": read_text,
+    ".csv": read_text,
+    ".npy": read_npy,
+    ".npz": read_npz,
+    ".obj": read_obj,
+}
+
+
+def read_points(path: str | os.PathLike) -> np.ndarray:
+    """Read the points of a scan, (n,3) float64 in the file's units, n >= 1.
+
+    .ply                    : x, y, z of the vertices; ascii or binary, with or without faces
+    .xyz, .pts, .txt, .csv  : a point a line, split by blanks, commas or semicolons; comments after # or //. A first
+                              line may name the columns, or be the number of points
+    .npy, .npz              : an (n,3) array (of a .npz: the one called `points`, else the only one of that shape)
+    .obj                    : the v lines
+
+    Further columns and properties are ignored; rows with NaN or infinite coordinates are kept. Raises
+    :class:`InputError` for anything else, before memory is taken for what the file does not hold.
+    """
+    path = Path(path)
+    try:
+        read = _reader(path)
+        points = read(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror or error}); check path and permissions") from error
+    if not len(points):
+        raise InputError(f"{path} holds no points")
+    return np.ascontiguousarray(points, np.float64)
+
+
+def _reader(path):
+    known = ", ".join(READERS)
+    size = path.stat().st_size
+    if not path.is_file():
+        raise InputError(f"{path} is not a file; give one of {known}")
+    if path.suffix.lower() not in READERS:
+        raise InputError(f"{path} has the extension {path.suffix!r}; known are {known}")
+    if size == 0:
+        raise InputError(f"{path} is empty")
+    return READERS[path.suffix.lower()]

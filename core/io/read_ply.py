@@ -1,0 +1,99 @@
+"""Points from PLY files, by way of plyfile."""
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
+
+from ..errors import InputError
+
+_FIRST_LINE = re.compile(rb"ply(\r\n|\n|\r)")
+_ELEMENT = re.compile(rb"^([ \t]*element[ \t]+\S+)[ \t]+(-?\d+)[ \t]*$", re.MULTILINE)
+
+
+def read_ply(path: Path) -> np.ndarray:
+    """x, y, z of the vertices, (n,3) float64."""
+    try:
+        return _read(path.read_bytes())
+    except (PlyParseError, ValueError, OverflowError) as error:
+        raise InputError(f"{path} is not a sound PLY file: {error}") from error
+
+
+def _read(content):
+    layout, counts, start = _header(content)
+    names = [element.name for element in layout]
+    if "vertex" not in names:
+        raise ValueError(f"it has no element 'vertex', only {names}")
+    last = names.index("vertex")
+    vertex = layout.elements[last]
+    scalars = {p.name for p in vertex.properties if not isinstance(p, PlyListProperty)}
+    if not set("xyz") <= scalars:
+        raise ValueError(f"its vertices have the numbers {sorted(scalars)}; x, y and z are needed")
+
+    rows = [_smallest_row(element, layout) for element in layout]
+    needed, held = sum(n * size for n, size in zip(counts, rows, strict=True)) - layout.text, len(content) - start
+    if needed > held:
+        raise ValueError(
+            f"its header claims {counts[last]} vertices and with all else at least {needed} bytes, "
+            f"but {held} follow; is it cut off?"
+        )
+
+    through_vertex = layout.elements[: last + 1]
+    if not layout.text and not any(isinstance(p, PlyListProperty) for e in through_vertex for p in e.properties):
+        offset = start + sum(n * size for n, size in zip(counts[:last], rows, strict=False))
+        vertices = np.frombuffer(content, vertex.dtype(layout.byte_order), counts[last], offset)
+        rest = content[offset + vertices.nbytes :] if last == len(names) - 1 else b""
+    else:
+        vertices, rest = _read_rows(through_vertex, counts, layout, content[start:])
+    if last == len(names) - 1 and rest.strip():
+        raise ValueError(f"its header claims {counts[last]} vertices, but more data follows them")
+    return np.stack([vertices[axis].astype(np.float64) for axis in "xyz"], axis=1)
+
+
+def _header(content):
+    """What the header declares (elements without rows), their row counts, and where the data start.
+
+    plyfile reads the header with every count set to zero, so that nothing is allocated before the counts are checked.
+    """
+    first = _FIRST_LINE.match(content)
+    if not first:
+        raise ValueError(f"it starts with {content[:16]!r}, not with a line 'ply'")
+    newline = first[1]
+    end_line = newline + b"end_header" + newline
+    end = content.find(end_line)
+    if end < 0:
+        raise ValueError("its header has no line 'end_header'; is it cut off?")
+    start = end + len(end_line)
+    counts = []
+
+    def without_rows(match):
+        counts.append(int(match[2]))
+        return match[1] + b" 0"
+
+    layout = PlyData.read(io.BytesIO(_ELEMENT.sub(without_rows, content[:start].replace(newline, b"\n"))))
+    if len(counts) != len(layout) or min(counts, default=0) < 0:
+        raise ValueError("an element of its header has no valid count")
+    return layout, counts, start
+
+
+def _smallest_row(element, layout):
+    """Bytes that a row takes at least; exact for binary rows without lists."""
+    if layout.text:
+        return 2 * len(element.properties)
+    return sum(
+        np.dtype(p.list_dtype()[0] if isinstance(p, PlyListProperty) else p.dtype()).itemsize
+        for p in element.properties
+    )
+
+
+def _read_rows(elements, counts, layout, body):
+    """The rows of the last of `elements` and the bytes or text after them, by plyfile, row by row."""
+    elements = [PlyElement(e.name, e.properties, n) for e, n in zip(elements, counts, strict=False)]
+    header = PlyData(elements, layout.text, layout.byte_order).header + "\n"
+    if layout.text:
+        stream = io.StringIO(header + body.decode("ascii", errors="replace"), newline=None)
+    else:
+        stream = io.BytesIO(header.encode("ascii") + body)
+    return PlyData.read(stream)[elements[-1].name].data, stream.read()

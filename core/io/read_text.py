@@ -1,0 +1,97 @@
+"""Points from text: tables of numbers and Wavefront OBJ."""
+
+from collections.abc import Iterable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+
+from ..errors import InputError
+
+
+def read_text(path: Path) -> np.ndarray:
+    """(n,3) float64 from a table; see :func:`core.io.points.read_points` for what it may look like."""
+    with _open(path) as file:
+        lines = _Lines(file)
+        rows = iter(lines)
+        first = next(rows, "")
+        claimed, columns = None, (0, 1, 2)
+        if first.isdecimal():
+            claimed, first = int(first), next(rows, "")
+        elif not any(map(_is_number, _split(first))):
+            columns, first = _named_columns(first), next(rows, "")
+        points = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), columns)
+    if claimed not in (None, len(points)):
+        raise InputError(f"{path} says {claimed} points in its first line, but {len(points)} follow; is it cut off?")
+    return points
+
+
+def read_obj(path: Path) -> np.ndarray:
+    """(n,3) float64 from the v lines of a Wavefront OBJ file."""
+    with _open(path) as file:
+        lines = _Lines(file)
+        return _table(path, lines, (line[2:] for line in lines if line.startswith(("v ", "v\t"))), None, (0, 1, 2))
+
+
+class _Lines:
+    """The lines that hold more than blanks and comments, stripped of both; remembers the last one handed out."""
+
+    def __init__(self, file: TextIO):
+        self._file = file
+        self.number = 0
+        self.text = ""
+
+    def __iter__(self) -> Iterator[str]:
+        for number, text in enumerate(self._file, start=1):
+            self.number, self.text = number, text
+            if "#" in text:
+                text = text.partition("#")[0]
+            if "//" in text:
+                text = text.partition("//")[0]
+            text = text.strip()
+            if text:
+                yield text
+
+
+def _open(path):
+    """Numbers are ASCII; what else stands in comments and further columns must not matter."""
+    return open(path, encoding="utf-8-sig", errors="replace")
+
+
+def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
+    first = next(rows := iter(rows), None)
+    if first is None:
+        return np.empty((0, 3))
+    try:
+        return np.loadtxt(chain([first], rows), delimiter=delimiter, usecols=columns, comments=None, ndmin=2)
+    except ValueError as error:  # loadtxt takes one row at a time: the last one is the culprit
+        seen = lines.text.strip()
+        seen = seen if len(seen) <= 60 else seen[:60] + "..."
+        raise InputError(
+            f"{path}: line {lines.number} is {seen!r}; numbers x y z are expected in "
+            f"columns {', '.join(str(column + 1) for column in columns)}"
+        ) from error
+
+
+def _delimiter(row):
+    """None stands for any run of blanks."""
+    return next((mark for mark in ";," if mark in row), None)
+
+
+def _split(row):
+    return [token.strip() for token in row.split(_delimiter(row))]
+
+
+def _named_columns(header):
+    """Where a line of names puts x, y and z; the first three columns if it does not say."""
+    names = [name.strip('"').lower() for name in _split(header)]
+    return tuple(map(names.index, "xyz")) if set("xyz") <= set(names) else (0, 1, 2)
+
+
+def _is_number(token):
+    try:
+        float(token)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,34 @@
+"""Reports as strict JSON."""
+
+import json
+import math
+import os
+
+import numpy as np
+
+from .atomic import atomic_path
+
+
+def report_json(report: dict) -> str:
+    """`report` as strict JSON text: NumPy scalars and arrays become numbers and lists, NaN and infinities null."""
+    return json.dumps(_plain(report), indent=2, allow_nan=False)
+
+
+def write_report(path: str | os.PathLike, report: dict) -> None:
+    """Write :func:`report_json` of `report` as the file `path`."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(report_json(report) + "\n", encoding="utf-8")
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,110 @@
+"""The whole method, in the order of the paper's algorithm box."""
+
+import time
+from dataclasses import asdict
+
+import numpy as np
+
+from .field.distance_field import DistanceField
+from .field.grid import fit_grid
+from .field.integration import integrate
+from .field.local_surface import fit_local_surface
+from .memory import peak_memory_mb
+from .normals.estimate import checked_constraints, estimate_normals
+from .points import local_spacing, prepare_samples
+from .progress import Progress
+from .reconstruction import Reconstruction
+from .settings import Settings
+from .surface.double_cover import double_cover
+from .surface.mesh import Mesh
+
+
+def reconstruct(points, settings: Settings = Settings(), constraints=None, progress=None) -> Reconstruction:
+    """Unsigned distance field, normals and double-covered surface of a point cloud without normals.
+
+    points      : (n,3) array-like of any scale and place; rows that are not finite and exact duplicates are dropped
+    constraints : (indices (k,), axes (k,3)), normals to hold fixed at rows of `points`, or None
+    progress    : callback (fraction, stage) -> bool or None; False cancels
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> from core import reconstruct, Settings
+    >>> sphere = np.random.default_rng(0).normal(size=(500, 3))
+    >>> sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
+    >>> result = reconstruct(sphere, Settings(resolution=32, surface="none"))
+    >>> abs(result.field.sample([[0, 0, 1.5]])[0] - 0.5) < 0.01
+    True
+
+    Raises :class:`InputError` for points or constraints that cannot be used, :class:`MissingDependency` where no
+    library that extracts iso-surfaces is found, :class:`Cancelled` where `progress` says so.
+    """
+    progress, stages = Progress.of(progress), _Stages()
+
+    with stages("points"):
+        samples = prepare_samples(points)
+        constraints = checked_constraints(constraints, samples.source_index)
+        spacing = local_spacing(samples.points)
+        grid = fit_grid(samples.points, settings.resolution)
+
+    with stages("normals"):
+        normals, confidence, counts = estimate_normals(
+            samples.points, spacing, settings, constraints, progress.part(0.0, 0.2, "normals")
+        )
+
+    with stages("field"):
+        local = fit_local_surface(samples.points, normals, spacing, settings.bridge)
+        values = integrate(local, grid, progress.part(0.2, 0.8, "distance field"))
+
+    surface = None
+    if settings.surface == "double":
+        with stages("surface"):
+            surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 1.0, "surface"))
+            surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
+
+    report = {
+        "settings": asdict(settings),
+        "counts": {
+            "input": len(np.asarray(points)),
+            "samples": len(samples.points),
+            **counts,
+            "rim_samples": int((local.rims.gap & ~local.rims.bridged).sum()),
+            "bridged_samples": int(local.rims.bridged.sum()),
+            "nodes": int(np.prod(grid.shape)),
+            **({} if surface is None else {"vertices": len(surface.vertices), "faces": len(surface.faces)}),
+        },
+        "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
+        "spacing": float(np.median(spacing)) * samples.scale,
+        "seconds": stages.seconds,
+        "peak_memory_mb": peak_memory_mb(),
+        "warnings": list(samples.warnings),
+    }
+    progress(1.0)
+    return Reconstruction(
+        points=samples.given,
+        source_index=samples.source_index,
+        normals=normals,
+        confidence=confidence,
+        field=DistanceField(
+            values * np.float32(samples.scale), samples.to_input_units(grid.origin), grid.spacing * samples.scale
+        ),
+        surface=surface,
+        report=report,
+    )
+
+
+class _Stages:
+    """Seconds spent in each stage, by name."""
+
+    def __init__(self):
+        self.seconds = {}
+
+    def __call__(self, name):
+        self._name, self._start = name, time.perf_counter()
+        return self
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.seconds[self._name] = time.perf_counter() - self._start

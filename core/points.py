@@ -1,0 +1,96 @@
+"""Validation of the input and the frame in which everything is computed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from .errors import InputError
+
+MINIMUM_SAMPLES = 4
+SPACING_NEIGHBOURS = 6
+_FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Distinct, finite samples and the similarity that takes them to the unit frame.
+
+    points       : (n,3) float64, unit frame: bounding box centred at 0, longest side 1
+    given        : (n,3) float64, the same in input units, untouched
+    source_index : (n,) int64, row of each sample in the input
+    centre       : (3,) float64, input units
+    scale        : float, longest side of the bounding box in input units
+    warnings     : what was dropped, one line each
+    """
+
+    points: np.ndarray
+    given: np.ndarray
+    source_index: np.ndarray
+    centre: np.ndarray
+    scale: float
+    warnings: tuple[str, ...] = ()
+
+    def to_input_units(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(x, np.float64) * self.scale + self.centre
+
+
+def prepare_samples(points) -> Samples:
+    """Check an (n,3) array-like, drop rows that are not finite and exact duplicates, and scale to the unit frame.
+
+    The centre is the middle of the bounding box, so clouds that differ by an exactly representable shift give the
+    same samples bit for bit. Raises :class:`InputError` for a wrong shape or type, fewer than 4 distinct finite
+    points, or points on one line (a plane is fine).
+    """
+    try:
+        points = np.asarray(points)
+        if np.iscomplexobj(points):
+            raise TypeError("complex numbers")
+        points = points.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"points are not an array of real numbers ({error}); give an (n,3) array") from error
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points have shape {points.shape}; give an (n,3) array of x, y, z")
+
+    warnings = []
+    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if len(finite) < len(points):
+        warnings.append(f"{len(points) - len(finite)} of {len(points)} points dropped: NaN or infinite coordinates")
+    source_index = _first_of_each(points, finite)
+    if len(source_index) < len(finite):
+        warnings.append(f"{len(finite) - len(source_index)} exact duplicates dropped")
+    if len(source_index) < MINIMUM_SAMPLES:
+        raise InputError(
+            f"{len(source_index)} distinct finite points of {len(points)} given; "
+            f"at least {MINIMUM_SAMPLES} are needed for a surface"
+        )
+
+    given = points[source_index]
+    low, high = given.min(axis=0), given.max(axis=0)
+    with np.errstate(over="ignore"):
+        scale = float((high - low).max())
+    if not np.isfinite(scale) or scale < np.finfo(np.float64).tiny / np.finfo(np.float64).eps:
+        raise InputError(f"the points span {scale:g}, which float64 cannot resolve; scale them to an ordinary size")
+    centre = low + (high - low) / 2
+    points = (given - centre) / scale
+    thickness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if thickness[1] < _FLATNESS * thickness[0]:
+        raise InputError(f"all {len(points)} distinct points lie on one line; a surface needs points off it")
+    return Samples(points, given, source_index, centre, scale, tuple(warnings))
+
+
+def local_spacing(points: np.ndarray) -> np.ndarray:
+    """rho, (n,) float64 in the units of `points`: mean distance of each sample to its 6 nearest (fewer if n < 7)."""
+    k = min(SPACING_NEIGHBOURS, len(points) - 1)
+    distances, _ = KDTree(points).query(points, k=k + 1, workers=-1)
+    return distances[:, 1:].mean(axis=1)
+
+
+def _first_of_each(points, rows):
+    """The rows (ascending) that hold the first occurrence of each distinct point; -0.0 equals 0.0."""
+    x, y, z = (points[rows] + 0.0).T
+    order = np.lexsort((rows, z, y, x))
+    ordered = points[rows[order]]
+    first = np.ones(len(order), bool)
+    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    return np.sort(rows[order[first]])

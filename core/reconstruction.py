@@ -1,0 +1,30 @@
+"""What a run returns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .field.distance_field import DistanceField
+from .surface.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """Everything a run found, in the input's units.
+
+    points       : (n',3) float64 samples used
+    source_index : (n',) int64, row of each sample in the input
+    normals      : (n',3) float64 unit axes; the sign carries no meaning
+    confidence   : (n',) float64 in [0,1], how well the neighbours agree on the axis
+    field        : DistanceField
+    surface      : Mesh, the closed double cover, or None where `surface="none"` was asked
+    report       : dict, JSON-ready: settings, counts, seconds per stage, peak memory, warnings
+    """
+
+    points: np.ndarray
+    source_index: np.ndarray
+    normals: np.ndarray
+    confidence: np.ndarray
+    field: DistanceField
+    surface: Mesh | None
+    report: dict
