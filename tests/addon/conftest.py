@@ -1,0 +1,76 @@
+"""The add-on inside pip's bpy: imported under a parent package of its own, as Blender does it, without installing."""
+
+import importlib
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def bpy():
+    return pytest.importorskip("bpy")
+
+
+@pytest.fixture(scope="session")
+def extension(bpy):
+    """Function: import a module of the extension by its dotted path from the repository's root."""
+    parent = types.ModuleType("vad_extension")
+    parent.__path__ = [str(ROOT)]
+    sys.modules["vad_extension"] = parent
+    return lambda name: importlib.import_module(f"vad_extension.{name}")
+
+
+@pytest.fixture
+def empty(bpy):
+    """Blender with an empty scene and no extension registered."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy
+
+
+@pytest.fixture
+def blender(empty, extension):
+    """Blender with an empty scene and the extension registered."""
+    vad_addon = extension("vad_addon")
+    vad_addon.register()
+    yield empty
+    vad_addon.unregister()
+
+
+@pytest.fixture
+def add(bpy):
+    """Function: link an object with this data to the scene and make it the active one."""
+
+    def add(name, data):
+        obj = bpy.data.objects.new(name, data)
+        bpy.context.scene.collection.objects.link(obj)
+        bpy.context.view_layer.objects.active = obj
+        obj.select_set(True)
+        return obj
+
+    return add
+
+
+@pytest.fixture
+def add_mesh(bpy, add):
+    """Function: an active mesh object of loose vertices at (n,3) points."""
+
+    def add_mesh(name, points):
+        data = bpy.data.meshes.new(name)
+        data.from_pydata(np.asarray(points).tolist(), [], [])
+        return add(name, data)
+
+    return add_mesh
+
+
+@pytest.fixture
+def sphere():
+    """(500,3) points of the unit sphere, on a Fibonacci spiral."""
+    z = 1 - (2 * np.arange(500) + 1) / 500
+    angle = np.pi * (1 + 5**0.5) * np.arange(500)
+    ring = np.sqrt(1 - z**2)
+    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), z])

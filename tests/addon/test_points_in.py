@@ -1,0 +1,130 @@
+"""Objects become points where NumPy says they are in the world."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+TRANSFORMS = {
+    "scale": dict(scale=(2, 0.5, 3)),
+    "mirror": dict(scale=(-1, 2, 1), rotation_euler=(0.3, 0.2, 0.9)),
+    "far": dict(location=(3.5e5, 5.5e6, 120), rotation_euler=(0, 0, 1)),
+}
+
+
+def world(transform):
+    """The 4x4 matrix of location, XYZ Euler angles and scale, by hand."""
+    cos, sin = np.cos, np.sin
+    x, y, z = transform.get("rotation_euler", (0, 0, 0))
+    turn_x = np.array([[1, 0, 0], [0, cos(x), -sin(x)], [0, sin(x), cos(x)]])
+    turn_y = np.array([[cos(y), 0, sin(y)], [0, 1, 0], [-sin(y), 0, cos(y)]])
+    turn_z = np.array([[cos(z), -sin(z), 0], [sin(z), cos(z), 0], [0, 0, 1]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn_z @ turn_y @ turn_x @ np.diag(transform.get("scale", (1, 1, 1)))
+    matrix[:3, 3] = transform.get("location", (0, 0, 0))
+    return matrix
+
+
+def moved(points, matrix):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+@pytest.fixture
+def read(blender, extension):
+    points_in = extension("vad_addon.points_in")
+
+    def read(obj):
+        points = points_in.world_points(obj, blender.context)
+        assert points.dtype == np.float64
+        assert points_in.point_count(obj, blender.context) == len(points)
+        return points
+
+    return read
+
+
+@pytest.fixture
+def cloud(extension):
+    """Function: point cloud data at (n,3) points."""
+    return lambda points: extension("vad_addon.datablocks").pointcloud_data("cloud", points, np.zeros(3), {})
+
+
+@pytest.mark.parametrize("kind", ["mesh", "cloud"])
+@pytest.mark.parametrize("name", TRANSFORMS)
+def test_world_coordinates(read, add, add_mesh, cloud, sphere, kind, name):
+    obj = add_mesh("Scan", sphere) if kind == "mesh" else add("Scan", cloud(sphere))
+    for key, value in TRANSFORMS[name].items():
+        setattr(obj, key, value)
+    scale = np.abs(moved(sphere, world(TRANSFORMS[name]))).max()
+    assert_allclose(read(obj), moved(sphere, world(TRANSFORMS[name])), atol=4e-7 * scale)
+
+
+def test_large_offsets_keep_the_detail_of_the_local_coordinates(read, add_mesh, sphere):
+    obj = add_mesh("Scan", sphere)
+    obj.location = (2**20, 2**22, 0)
+    assert_allclose(read(obj) - obj.location, sphere, atol=1e-7)
+
+
+def test_parents_count(read, blender, add, add_mesh, sphere):
+    parent, child = add("Parent", None), add_mesh("Scan", sphere)
+    child.parent = parent
+    for obj, name in ((parent, "mirror"), (child, "scale")):
+        for key, value in TRANSFORMS[name].items():
+            setattr(obj, key, value)
+    assert_allclose(read(child), moved(sphere, world(TRANSFORMS["mirror"]) @ world(TRANSFORMS["scale"])), atol=2e-6)
+
+
+def test_modifiers_count(read, add_mesh, sphere):
+    obj = add_mesh("Scan", sphere)
+    obj.modifiers.new("Array", "ARRAY")
+    assert len(read(obj)) == 2 * len(sphere)
+
+
+def test_vertices_made_in_edit_mode_count(read, blender, add_mesh, sphere):
+    import bmesh
+
+    obj = add_mesh("Scan", sphere)
+    blender.ops.object.mode_set(mode="EDIT")
+    bmesh.from_edit_mesh(obj.data).verts.new((7, 8, 9))
+    points = read(obj)
+    assert len(points) == 501
+    assert_allclose(points[-1], (7, 8, 9))
+
+
+def test_modifiers_count_in_edit_mode(blender, extension, add_mesh, sphere):
+    import bmesh
+
+    obj = add_mesh("Scan", sphere)
+    obj.modifiers.new("Array", "ARRAY")
+    blender.ops.object.mode_set(mode="EDIT")
+    blender.context.evaluated_depsgraph_get()
+    bmesh.from_edit_mesh(obj.data).verts.new((7, 8, 9))
+    assert len(extension("vad_addon.points_in").world_points(obj, blender.context)) == 2 * 501
+
+
+def test_hair_curves(read, blender, add):
+    data = blender.data.hair_curves.new("hair")
+    data.add_curves([3, 2])
+    positions = np.arange(15, dtype=np.float32)
+    data.attributes["position"].data.foreach_set("vector", positions)
+    assert_allclose(read(add("Hair", data)), positions.reshape(5, 3))
+
+
+@pytest.mark.parametrize("instances", [False, True])
+def test_points_made_by_geometry_nodes(read, blender, add_mesh, sphere, instances):
+    nodes = blender.data.node_groups.new("nodes", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        nodes.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    start, end = nodes.nodes.new("NodeGroupInput"), nodes.nodes.new("NodeGroupOutput")
+    middle = nodes.nodes.new("GeometryNodeInstanceOnPoints" if instances else "GeometryNodeMeshToPoints")
+    nodes.links.new(start.outputs[0], middle.inputs[0])
+    if instances:
+        cube = nodes.nodes.new("GeometryNodeMeshCube")
+        nodes.links.new(cube.outputs[0], middle.inputs["Instance"])
+    nodes.links.new(middle.outputs[0], end.inputs[0])
+    obj = add_mesh("Scan", sphere)
+    obj.modifiers.new("nodes", "NODES").node_group = nodes
+    assert_allclose(read(obj), sphere, atol=1e-7)
+
+
+def test_an_object_without_points_is_refused(read, add_mesh, extension):
+    with pytest.raises(extension("core.errors").InputError, match="Scan has 0 points"):
+        read(add_mesh("Scan", np.empty((0, 3))))

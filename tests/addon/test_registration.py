@@ -1,0 +1,107 @@
+"""Registering is reversible, and says what to do where SciPy is missing."""
+
+import sys
+
+import pytest
+
+
+def shown(bpy):
+    names = {name for name in dir(bpy.types) if name.startswith("VAD_")}
+    return names | ({"Scene.vad"} if hasattr(bpy.types.Scene, "vad") else set())
+
+
+def test_registering_twice_leaves_nothing_behind(empty, extension):
+    vad_addon = extension("vad_addon")
+    assert shown(empty) == set()
+    for _ in range(2):
+        vad_addon.register()
+        assert {"Scene.vad", "VAD_PT_reconstruct", "VAD_OT_reconstruct"} <= shown(empty)
+        vad_addon.unregister()
+        assert shown(empty) == set()
+
+
+@pytest.fixture
+def without_scipy(monkeypatch):
+    for name in [name for name in sys.modules if name.partition(".")[0] == "scipy"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "scipy", None)
+
+
+def test_without_scipy_the_tab_and_the_operator_say_what_to_do(empty, extension, without_scipy):
+    vad_addon = extension("vad_addon")
+    vad_addon.register()
+    try:
+        assert "Install the VAD zip" in " ".join(drawn(empty, extension, "VAD_PT_reconstruct", "unavailable").texts)
+        with pytest.raises(RuntimeError, match=r"SciPy does not import.*pip install scipy"):
+            empty.ops.vad.reconstruct(resolution=64)
+    finally:
+        vad_addon.unregister()
+    assert shown(empty) == set()
+
+
+class Layout:
+    """Stands in for Blender's layout, which needs a window: keeps the texts and the properties shown."""
+
+    def __init__(self):
+        self.texts, self.props, self.operators = [], [], []
+
+    def column(self, align=False):
+        return self
+
+    def label(self, text, icon="NONE"):
+        self.texts.append(text)
+
+    def prop(self, data, name):
+        assert name in data.bl_rna.properties
+        self.props.append(name)
+
+    def operator(self, name, icon="NONE"):
+        self.operators.append(name)
+
+
+def drawn(bpy, extension, name, module="panel"):
+    panel = getattr(extension(f"vad_addon.{module}"), name)
+
+    class Shown:
+        layout = Layout()
+        problem = getattr(panel, "problem", "")
+
+    panel.draw(Shown, bpy.context)
+    return Shown.layout
+
+
+def test_the_tab_shows_every_setting_once(blender, extension):
+    panels = [drawn(blender, extension, name) for name in ("VAD_PT_reconstruct", "VAD_PT_more_settings")]
+    assert panels[0].props == ["resolution", "bridge", "offset"]
+    assert sorted(panels[0].props + panels[1].props) == sorted(extension("core.settings").options())
+    assert panels[0].operators == ["vad.reconstruct"]
+
+
+def test_the_tab_names_what_is_selected(blender, extension, add, add_mesh):
+    def text():
+        lines = drawn(blender, extension, "VAD_PT_reconstruct").texts
+        assert max(map(len, lines)) <= 36
+        return " ".join(lines)
+
+    assert text() == "No active object: select a point cloud or a mesh"
+    add("Eye", blender.data.cameras.new("Eye"))
+    assert text() == "Eye (camera) holds no points: select a point cloud or a mesh"
+    add_mesh("Scan", [(0, 0, 0)] * 1234)
+    assert text() == "Scan: 1,234 points"
+
+
+def test_the_tab_sums_up_the_last_run_with_its_warnings(blender, extension):
+    panel = extension("vad_addon.panel").VAD_PT_last_run
+    assert not panel.poll(blender.context)
+    blender.context.scene.vad.result = blender.data.collections.new("Scan VAD")
+    blender.context.scene.vad.result["vad_summary"] = "500 samples\n1.5 s"
+    blender.context.scene.vad.result["vad_warnings"] = "a long tale of things that went wrong on the way\nand more"
+    assert panel.poll(blender.context)
+    assert drawn(blender, extension, "VAD_PT_last_run").texts == [
+        "Scan VAD",
+        "500 samples",
+        "1.5 s",
+        "a long tale of things that went",
+        "wrong on the way",
+        "and more",
+    ]
