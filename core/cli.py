@@ -19,7 +19,7 @@ from .io.points import READERS, read_points
 from .io.report import report_json, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
-from .points import prepare_samples
+from .points import local_spacing, prepare_samples
 from .reconstruction import Reconstruction
 from .settings import Settings, options
 
@@ -220,22 +220,22 @@ def _info(given):
         "not_finite": len(points) - finite,
         "duplicates": finite - len(used),
         "box": {"low": low, "high": high, "size": high - low},
-        "spacing": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
+        "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
+        "spacing": np.median(local_spacing(samples.points)) * samples.scale,
         "resolution": resolution,
-        "cell": grid.spacing,
-        "grid": grid.shape,
+        "grid": {"shape": grid.shape, "cell": grid.spacing},
     }
     print(report_json(facts) if given.json else _described(facts))
 
 
 def _described(facts):
-    box, spacing = facts["box"], facts["spacing"]
-    low, high, size = (" ".join(f"{x:.6g}" for x in box[key]) for key in ("low", "high", "size"))
-    shape = " x ".join(map(str, facts["grid"]))
+    low, high, size = (" ".join(f"{x:.9g}" for x in facts["box"][key]) for key in ("low", "high", "size"))
+    smallest, median, largest = (f"{x:.3g}" for x in facts["nearest_neighbour"].values())
+    shape = " x ".join(map(str, facts["grid"]["shape"]))
     return (
         f"points   {facts['points']}, of which {facts['not_finite']} not finite and {facts['duplicates']} duplicates\n"
         f"box      {low} to {high}, size {size}\n"
-        f"spacing  {spacing['median']:.3g} to the nearest neighbour (median; "
-        f"{spacing['smallest']:.3g} to {spacing['largest']:.3g})\n"
-        f"cell     {facts['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes"
+        f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
+        f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"
+        f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes"
     )

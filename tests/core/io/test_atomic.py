@@ -1,0 +1,82 @@
+import os
+import resource
+
+import pytest
+
+from core import VADError
+from core.io.atomic import atomic_path, writable_folder
+
+
+def test_a_finished_file_replaces_the_old_one(tmp_path):
+    target = tmp_path / "file.txt"
+    target.write_text("old")
+    with atomic_path(target) as temporary:
+        temporary.write_text("new")
+        assert target.read_text() == "old"
+    assert target.read_text() == "new"
+    assert os.listdir(tmp_path) == ["file.txt"]
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt, VADError])
+def test_a_failure_midway_leaves_the_old_file_and_nothing_else(tmp_path, failure):
+    target = tmp_path / "file.txt"
+    target.write_text("old")
+
+    def broken():
+        with atomic_path(target) as temporary:
+            temporary.write_text("half")
+            raise failure
+
+    with pytest.raises(failure):
+        broken()
+    assert target.read_text() == "old"
+    assert os.listdir(tmp_path) == ["file.txt"]
+
+
+def test_a_full_disk_is_one_line_that_names_the_file(tmp_path):
+    target = tmp_path / "file.bin"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with (
+            pytest.raises(VADError, match=r"file\.bin cannot be written \(File too large\)"),
+            atomic_path(target) as temporary,
+        ):
+            temporary.write_bytes(bytes(2000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert os.listdir(tmp_path) == []
+
+
+def test_files_get_the_usual_permissions(tmp_path):
+    with atomic_path(tmp_path / "file.txt") as temporary:
+        temporary.write_text("")
+    (tmp_path / "plain.txt").write_text("")
+    assert (tmp_path / "file.txt").stat().st_mode == (tmp_path / "plain.txt").stat().st_mode
+
+
+@pytest.mark.parametrize("name", ["missing/file.txt", "plain/file.txt", "folder"])
+def test_an_impossible_target_is_refused(tmp_path, name):
+    (tmp_path / "plain").write_text("")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(VADError, match="cannot be written"), atomic_path(tmp_path / name) as temporary:
+        temporary.write_text("")
+    assert sorted(os.listdir(tmp_path)) == ["folder", "plain"]
+
+
+def test_writable_folder_makes_parents_and_leaves_no_trace(tmp_path):
+    assert os.listdir(writable_folder(tmp_path / "a" / "b")) == []
+    assert os.listdir(writable_folder(tmp_path / "a" / "b")) == []
+
+
+def test_writable_folder_refuses_a_file_and_a_denied_folder(tmp_path, monkeypatch):
+    (tmp_path / "plain").write_text("")
+    with pytest.raises(VADError, match="plain"):
+        writable_folder(tmp_path / "plain")
+
+    def denied(**_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("core.io.atomic.tempfile.TemporaryFile", denied)
+    with pytest.raises(VADError, match="Permission denied"):
+        writable_folder(tmp_path)

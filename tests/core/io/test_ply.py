@@ -1,0 +1,67 @@
+import os
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from plyfile import PlyData
+
+from core import Mesh, VADError
+from core.io.ply import write_mesh, write_points
+from core.io.points import read_points
+
+coordinates = st.floats(-1e12, 1e12)
+FAR_TETRAHEDRON = Mesh(
+    np.vstack([np.zeros(3), np.eye(3)]) + np.array([4_500_000.123456, 500_000.654321, 0.1]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32),
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("written")
+
+
+def test_a_mesh_comes_back_exactly(folder):
+    write_mesh(folder / "mesh.ply", FAR_TETRAHEDRON)
+    data = PlyData.read(folder / "mesh.ply")
+    assert (data.text, data.byte_order) == (False, "<")
+    np.testing.assert_array_equal(read_points(folder / "mesh.ply"), FAR_TETRAHEDRON.vertices)
+    np.testing.assert_array_equal(np.stack(data["face"]["vertex_indices"]), FAR_TETRAHEDRON.faces)
+
+
+def test_the_bytes_are_those_the_format_prescribes(folder):
+    mesh = Mesh(np.array([[0.1, 0.2, 0.3]] * 3), np.array([[0, 1, 2]], np.int32))
+    write_mesh(folder / "mesh.ply", mesh)
+    header = (
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
+        b"property double z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    body = struct.pack("<3d", 0.1, 0.2, 0.3) * 3 + struct.pack("<B3i", 3, 0, 1, 2)
+    assert (folder / "mesh.ply").read_bytes() == header + body
+
+
+def test_an_empty_mesh(folder):
+    write_mesh(folder / "mesh.ply", Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))
+    assert [len(element) for element in PlyData.read(folder / "mesh.ply")] == [0, 0]
+
+
+@settings(deadline=None)
+@given(arrays(np.float64, st.tuples(st.integers(0, 5), st.just(7)), elements=coordinates), st.booleans())
+def test_points_come_back_with_normals_and_confidence(folder, table, confident):
+    points, normals, confidence = table[:, :3], table[:, 3:6], table[:, 6] if confident else None
+    write_points(folder / "points.ply", points, normals, confidence)
+    vertex = PlyData.read(folder / "points.ply")["vertex"]
+    assert [p.name for p in vertex.properties] == ["x", "y", "z", "nx", "ny", "nz"] + ["confidence"] * confident
+    np.testing.assert_array_equal(np.stack([vertex[n] for n in ("x", "y", "z")], axis=1), points)
+    np.testing.assert_array_equal(np.stack([vertex[n] for n in ("nx", "ny", "nz")], axis=1), np.float32(normals))
+    if confident:
+        np.testing.assert_array_equal(vertex["confidence"], np.float32(confidence))
+
+
+def test_a_failed_write_leaves_nothing(tmp_path):
+    with pytest.raises(VADError, match="cannot be written"):
+        write_mesh(tmp_path / "missing" / "mesh.ply", FAR_TETRAHEDRON)
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,107 @@
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from core import InputError
+from core.io.points import read_points
+
+numbers = st.floats(width=64, allow_nan=True, allow_infinity=True)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("text")
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_bytes(text.encode("utf-8"))
+    return path
+
+
+def refusal(folder, name, text):
+    with pytest.raises(InputError) as caught:
+        read_points(written(folder, name, text))
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@settings(deadline=None)
+@given(
+    arrays(np.float64, st.tuples(st.integers(1, 8), st.integers(3, 6)), elements=numbers),
+    st.sampled_from(["\n", "\r\n"]),
+    st.sampled_from([" ", "\t", "  \t ", ",", ", ", ";", " ; "]),
+    st.sampled_from(["", "\ufeff", "# x y z\n", "// scan 7; a, b\n\n", "x{0}y{0}z\n", "count\n", "plain words\n"]),
+    st.sampled_from(["", "\n", "\n\n  \n# end"]),
+)
+def test_round_trip(folder, table, newline, mark, head, tail):
+    rows = "\n".join(mark.join(repr(float(x)) for x in row) for row in table)
+    head = f"{len(table)}\n" if head == "count\n" else head.format(mark)
+    path = written(folder, "scan.xyz", (head + rows + tail).replace("\n", newline))
+    np.testing.assert_array_equal(read_points(path), table[:, :3])
+
+
+def test_comments_and_blank_lines_anywhere(folder):
+    text = "# a\n\n1 2 3 # b\n  \n// c\n4 5 6 // d\n"
+    assert read_points(written(folder, "scan.txt", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_named_columns_are_found_wherever_they_stand(folder):
+    text = 'id,label,"Y","X","Z",intensity\n7,wall,2,1,3,9\n8,floor,5,4,6,9\n'
+    assert read_points(written(folder, "scan.csv", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_text_in_further_columns_is_ignored(folder):
+    path = folder / "scan.txt"
+    path.write_bytes(b"1 2 3 caf\xe9\n4 5 6 wall\n")
+    assert read_points(path).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize("bad", ["4 five 6", "4 5", "four five six", "4 5 1,5", "1.#IND 2 3", "x" * 500])
+@pytest.mark.parametrize("line", [2, 5])
+def test_a_bad_line_is_named_by_its_number(folder, bad, line):
+    lines = ["1 2 3", "# comment", "", "1 2 3", "1 2 3"]
+    lines[line - 1] = bad
+    message = refusal(folder, "scan.xyz", "\n".join(lines))
+    assert f"line {line} is '{bad[:10]}" in message
+    assert len(message) < len(str(folder)) + 200
+
+
+def test_a_table_of_words_is_refused(folder):
+    assert "line 2 is 'anna,red,oslo'" in refusal(folder, "scan.csv", "name,colour,town\nanna,red,oslo\n")
+    assert "line 2 is" in refusal(folder, "scan.txt", "Dear reader,\nthis is a letter\n")
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 10**15])
+def test_a_wrong_count_is_refused(folder, count):
+    assert f"says {count} points in its first line, but 2 follow" in refusal(
+        folder, "scan.pts", f"{count}\n1 2 3\n4 5 6\n"
+    )
+
+
+@pytest.mark.parametrize("text", ["\n\n", "# only\n", "x y z\n", "0\n"])
+def test_no_points(folder, text):
+    assert "holds no points" in refusal(folder, "scan.xyz", text)
+
+
+def test_obj_takes_vertices_only(folder):
+    text = "# o\nmtllib a.mtl\nv 1 2 3\nv\t4 5 6 0.5 0.5 0.5\nvn 0 0 1\nvt 0 0\n  v 7 8 9 1 # w\nf 1//1 2//1 3//1\n"
+    assert read_points(written(folder, "scan.obj", text)).tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+
+
+def test_obj_refusals(folder):
+    assert "line 3 is 'v 1 2'" in refusal(folder, "scan.obj", "o thing\nv 1 2 3\nv 1 2\n")
+    assert "holds no points" in refusal(folder, "scan.obj", "o thing\nvn 1 2 3\n")
+
+
+def test_a_million_rows_in_seconds(folder):
+    path = written(folder, "scan.xyz", "1.25 -2.5 3.75\n" * 1_000_000)
+    start = time.perf_counter()
+    points = read_points(path)
+    assert time.perf_counter() - start < 5
+    assert points.shape == (1_000_000, 3)
+    path.unlink()

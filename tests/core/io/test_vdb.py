@@ -1,0 +1,100 @@
+import os
+import resource
+
+import numpy as np
+import pytest
+
+from core import DistanceField, MissingDependency, VADError
+from core.io.openvdb_module import load_openvdb
+from core.io.vdb import write_vdb
+
+ORIGIN, SPACING = np.array([4_500_000.5, -2.25, 0.125]), 0.03125
+SHAPE = (20, 24, 28)
+
+
+@pytest.fixture(scope="module")
+def openvdb():
+    try:
+        return load_openvdb()
+    except MissingDependency as error:
+        pytest.skip(str(error))
+
+
+def plane(band=np.inf):
+    """Distance to the tilted plane through the middle of the box; the gradient is constant on either side."""
+    cells = np.stack(np.meshgrid(*map(np.arange, SHAPE), indexing="ij"), axis=-1) - np.array(SHAPE) / 2
+    distance = np.abs(cells @ [0.6, 0.0, 0.8]) * SPACING
+    return DistanceField(np.minimum(distance, band).astype(np.float32), ORIGIN, SPACING, band)
+
+
+def values(grid, kind=np.float32, width=()):
+    array = np.empty(SHAPE + width, kind)
+    grid.copyToArray(array)
+    return array
+
+
+@pytest.mark.parametrize("band", [np.inf, 3 * SPACING, 0.1])
+def test_udf_comes_back_exactly_in_its_place(openvdb, tmp_path, band):
+    field = plane(band)
+    write_vdb(tmp_path / "field.vdb", field)
+    grids, _ = openvdb.readAll(str(tmp_path / "field.vdb"))
+    density, udf = sorted(grids, key=lambda grid: grid.name)
+    assert (density.name, udf.name) == ("density", "udf")
+    np.testing.assert_array_equal(values(udf), field.values)
+    assert udf.background == (field.values.max() if np.isinf(band) else np.float32(band))
+    assert not udf.saveFloatAsHalf
+    for node in [(0, 0, 0), (19, 5, 7)]:
+        np.testing.assert_allclose(udf.transform.indexToWorld(node), ORIGIN + SPACING * np.array(node), rtol=1e-15)
+        np.testing.assert_allclose(density.transform.indexToWorld(node), udf.transform.indexToWorld(node))
+
+
+def test_a_band_is_stored_sparse_and_a_dense_field_is_not(openvdb, tmp_path):
+    counts = []
+    for band in (2 * SPACING, np.inf):
+        write_vdb(tmp_path / "field.vdb", plane(band))
+        counts.append(openvdb.read(str(tmp_path / "field.vdb"), "udf").activeVoxelCount())
+    assert counts[0] < np.prod(SHAPE) / 2 < 0.99 * np.prod(SHAPE) < counts[1]
+
+
+def test_density_is_visible_fog_around_the_surface(openvdb, tmp_path):
+    field = plane()
+    write_vdb(tmp_path / "field.vdb", field)
+    density = openvdb.read(str(tmp_path / "field.vdb"), "density")
+    assert density.background == 0
+    assert density.gridClass == openvdb.GridClass.FOG_VOLUME
+    fog = values(density)
+    np.testing.assert_allclose(fog, np.clip(1 - field.values / (2 * SPACING), 0, 1), atol=1e-6)
+    assert fog[field.values == 0].min() == 1
+    assert not fog[field.values > 2 * SPACING].any()
+
+
+def test_gradient_points_away_from_the_plane(openvdb, tmp_path):
+    field = plane()
+    write_vdb(tmp_path / "field.vdb", field, gradient=True)
+    slopes = values(openvdb.read(str(tmp_path / "field.vdb"), "gradient"), width=(3,))
+    away = field.values > 1.5 * SPACING
+    cells = np.stack(np.meshgrid(*map(np.arange, SHAPE), indexing="ij"), axis=-1) - np.array(SHAPE) / 2
+    side = np.sign(cells @ [0.6, 0.0, 0.8])[..., None] * [0.6, 0.0, 0.8]
+    np.testing.assert_allclose(slopes[away], side[away], atol=1e-4)
+
+
+def test_a_full_disk_is_noticed(openvdb, tmp_path):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    (tmp_path / "field.vdb").write_text("old")
+    write_vdb(tmp_path / "whole.vdb", plane())
+    size = (tmp_path / "whole.vdb").stat().st_size
+    (tmp_path / "whole.vdb").unlink()
+    for room in (0, 40, 500, size // 2, size - 1):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
+        try:
+            with pytest.raises(VADError, match=r"field\.vdb cannot be written whole"):
+                write_vdb(tmp_path / "field.vdb", plane())
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert os.listdir(tmp_path) == ["field.vdb"]
+    assert (tmp_path / "field.vdb").read_text() == "old"
+
+
+def test_a_missing_folder(openvdb, tmp_path):
+    with pytest.raises(VADError, match="cannot be written"):
+        write_vdb(tmp_path / "missing" / "field.vdb", plane())

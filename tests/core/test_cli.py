@@ -1,0 +1,271 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plyfile import PlyData
+
+from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
+from core.io.openvdb_module import load_openvdb
+from core.io.points import read_points
+from core.settings import options
+
+ROOT = Path(__file__).parents[2]
+REPORT = {
+    "settings": {},
+    "counts": {"samples": 4},
+    "seconds": {"normals": 1.0, "field": np.float64(0.5)},
+    "warnings": [],
+}
+
+
+@pytest.fixture
+def scan(tmp_path):
+    """A ball of 400 points, far from the origin."""
+    points = np.random.default_rng(0).normal(size=(400, 3))
+    np.save(tmp_path / "ball.npy", points / np.linalg.norm(points, axis=1, keepdims=True) + [1000, 0, 0])
+    return str(tmp_path / "ball.npy")
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Replaces the method by a recorder with a made-up result, so that these tests are about the command line."""
+    made = []
+
+    def reconstruct(points, settings, progress):
+        made.append((points, settings))
+        for k in range(5):
+            if progress(k / 4, f"stage {k}") is False:
+                raise cli.Cancelled("cancelled during 'stage'; nothing was written")
+        return Reconstruction(
+            points[:4],
+            np.arange(4),
+            np.eye(4, 3),
+            np.ones(4),
+            DistanceField(np.ones((4, 4, 4), np.float32), np.zeros(3), 0.25),
+            Mesh(points[:4], np.array([[0, 1, 2]], np.int32)) if settings.surface != "none" else None,
+            REPORT,
+        )
+
+    monkeypatch.setattr(cli, "reconstruct", reconstruct)
+    return made
+
+
+def run(capsys, *arguments):
+    """Exit status, stdout and stderr of the command line."""
+    status = cli.main([str(argument) for argument in arguments])
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+def refused(capsys, *arguments):
+    """The one line on stderr of a call that is refused with status 2."""
+    status, out, err = run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    return err
+
+
+def test_every_file_is_written_and_told(capsys, scan, calls, tmp_path):
+    status, out, err = run(capsys, "reconstruct", scan, "-o", tmp_path / "deep" / "out")
+    assert status == 0
+    names = ["ball.json", "ball.vdb", "ball_double.ply", "ball_points.ply"]
+    assert sorted(os.listdir(tmp_path / "deep" / "out")) == names
+    assert "4 samples reconstructed in 1.5 s" in out
+    assert all(str(tmp_path / "deep" / "out" / name) in out for name in names)
+    assert err == ""
+    np.testing.assert_array_equal(calls[0][0], np.load(scan))
+    assert len(PlyData.read(tmp_path / "deep" / "out" / "ball_double.ply")["face"]) == 1
+    np.testing.assert_array_equal(read_points(tmp_path / "deep" / "out" / "ball_points.ply"), np.load(scan)[:4])
+
+
+def test_json_is_all_there_is_on_stdout_and_equals_the_report_file(capsys, scan, calls, tmp_path):
+    status, out, _ = run(capsys, "reconstruct", scan, "-o", tmp_path / "out", "--json")
+    report = json.loads(out)
+    assert status == 0
+    assert report["seconds"] == {"normals": 1.0, "field": 0.5}
+    assert sorted(report["files"]) == sorted(str(path) for path in (tmp_path / "out").iterdir())
+    assert report == json.loads((tmp_path / "out" / "ball.json").read_text())
+
+
+def test_no_mesh_was_asked(capsys, scan, calls, tmp_path):
+    run(capsys, "reconstruct", scan, "-o", tmp_path / "out", "--surface", "none")
+    assert sorted(os.listdir(tmp_path / "out")) == ["ball.json", "ball.vdb", "ball_points.ply"]
+
+
+def test_gradient_grid_on_request(capsys, scan, calls, tmp_path):
+    openvdb = load_openvdb()
+    for flags, names in (([], {"udf", "density"}), (["--gradient"], {"udf", "density", "gradient"})):
+        run(capsys, "reconstruct", scan, "-o", tmp_path / "out", *flags)
+        assert {grid.name for grid in openvdb.readAll(str(tmp_path / "out" / "ball.vdb"))[0]} == names
+
+
+def test_defaults_are_those_of_settings(capsys, scan, calls, tmp_path):
+    run(capsys, "reconstruct", scan, "-o", tmp_path)
+    assert calls[0][1] == Settings()
+
+
+@pytest.mark.parametrize("name", options())
+def test_every_setting_is_an_option(capsys, scan, calls, tmp_path, name):
+    field = options()[name]
+    other = field.metadata["choices"][-1] if field.metadata["choices"] else field.metadata["limits"][1]
+    run(capsys, "reconstruct", scan, "-o", tmp_path, f"--{name.replace('_', '-')}", other)
+    assert calls[0][1] == Settings(**{name: other})
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("resolution", "0"), ("resolution", "10000"), ("resolution", "64.5"), ("resolution", "fine"), ("bridge", "-1"),
+     ("bridge", "nan"), ("surface", "triple"), ("seed", "-1")],
+)  # fmt: skip
+def test_a_bad_value_gets_the_message_of_settings(capsys, scan, calls, tmp_path, option, value):
+    message = refused(capsys, "reconstruct", scan, "-o", tmp_path / "out", f"--{option}", value)
+    assert option in message
+    assert value in message
+    assert not (tmp_path / "out").exists()
+    assert not calls
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["restore"], ["reconstruct"], ["reconstruct", "a.ply"], ["info", "a.ply", "--res", "64"]]
+)
+def test_bad_usage_is_one_line_that_points_to_the_help(capsys, arguments):
+    assert "--help" in refused(capsys, *arguments)
+
+
+@pytest.mark.parametrize("command", [["reconstruct", "-o", "out"], ["info"]])
+def test_a_bad_scan_is_one_line(capsys, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.xyz").write_text("1 2 3\n1 2\n")
+    assert "line 2" in refused(capsys, *command, "bad.xyz")
+    assert "No such file" in refused(capsys, *command, "none.xyz")
+    assert os.listdir(tmp_path) == ["bad.xyz"]
+
+
+def test_an_unusable_output_folder_is_refused_before_the_work(capsys, scan, calls):
+    assert "nothing can be written into" in refused(capsys, "reconstruct", scan, "-o", scan)
+    assert not calls
+
+
+def test_errors_with_json_are_json_too(capsys):
+    status, out, err = run(capsys, "info", "none.ply", "--json")
+    assert status == 2
+    assert err == f"error: {json.loads(out)['error']}\n"
+    status, out, _ = run(capsys, "reconstruct", "--json")
+    assert "required" in json.loads(out)["error"]
+
+
+def test_without_openvdb_the_rest_is_delivered_with_a_warning(capsys, scan, calls, tmp_path, monkeypatch):
+    def absent():
+        raise MissingDependency("OpenVDB is not installed; get it")
+
+    monkeypatch.setattr("core.io.vdb.load_openvdb", absent)
+    status, out, err = run(capsys, "reconstruct", scan, "-o", tmp_path / "out", "--json")
+    assert status == 0
+    assert sorted(os.listdir(tmp_path / "out")) == ["ball.json", "ball_double.ply", "ball_points.ply"]
+    assert "ball.vdb is not written: OpenVDB is not installed; get it" in json.loads(out)["warnings"][0]
+    assert err == f"warning: {json.loads(out)['warnings'][0]}\n"
+    assert REPORT["warnings"] == []
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkeypatch, presses):
+    def reconstruct(points, settings, progress):
+        for _ in range(presses):
+            os.kill(os.getpid(), signal.SIGINT)
+        assert progress(0.5, "field") is False
+        raise cli.Cancelled("cancelled during 'field'; nothing was written")
+
+    monkeypatch.setattr(cli, "reconstruct", reconstruct)
+    before = signal.getsignal(signal.SIGINT)
+    status, out, err = run(capsys, "reconstruct", scan, "-o", tmp_path / "out")
+    assert (status, out) == (130, "")
+    assert err.startswith("error: cancelled")
+    assert err.count("\n") == 1
+    assert os.listdir(tmp_path / "out") == []
+    assert signal.getsignal(signal.SIGINT) == before
+
+
+def test_the_bar_shows_on_a_terminal_only(capsys, scan, calls, tmp_path, monkeypatch):
+    assert run(capsys, "reconstruct", scan, "-o", tmp_path)[2] == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert "stage" in run(capsys, "reconstruct", scan, "-o", tmp_path)[2]
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["reconstruct", "--help"], ["info", "--help"]])
+def test_help(capsys, arguments):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(arguments)
+    assert caught.value.code == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "SCAN" in text or "python -m core reconstruct bunny.ply -o out" in text
+    for name, field in options().items() if arguments[0] == "reconstruct" else ():
+        assert f"--{name}" in text
+        assert field.metadata["help"][:30] in text
+        assert f"default {field.default}" in text
+
+
+def test_info_counts_and_measures(capsys, tmp_path):
+    """A 20 x 10 lattice of step 0.5 with two repeated points and one that is not finite."""
+    x, y = np.meshgrid(np.arange(20), np.arange(10))
+    lattice = np.stack([x.ravel(), y.ravel(), np.zeros(200)], axis=1) * 0.5 + [7, 8, 9]
+    np.save(tmp_path / "lattice.npy", np.vstack([lattice, lattice[:2], [[np.nan, 0, 0]]]))
+    status, out, _ = run(capsys, "info", tmp_path / "lattice.npy", "--json", "--resolution", 64)
+    facts = json.loads(out)
+    assert status == 0
+    assert (facts["points"], facts["not_finite"], facts["duplicates"]) == (203, 1, 2)
+    assert facts["box"] == {"low": [7, 8, 9], "high": [16.5, 12.5, 9], "size": [9.5, 4.5, 0]}
+    np.testing.assert_allclose([facts["nearest_neighbour"][key] for key in ("smallest", "median", "largest")], 0.5)
+    assert facts["resolution"] == 64
+    np.testing.assert_allclose(facts["grid"]["cell"], 9.5 * 1.25 / 64)  # padded by an eighth on either side
+    assert facts["grid"]["shape"][0] == 65
+    np.testing.assert_allclose(facts["spacing"], 0.5 * (4 + 2 * np.sqrt(2)) / 6)  # four straight, two diagonal
+    status, out, _ = run(capsys, "info", tmp_path / "lattice.npy")
+    assert "203, of which 1 not finite and 2 duplicates" in out
+    assert "size 9.5 4.5 0" in out
+
+
+def test_a_real_process_from_scan_to_files(scan, tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "core",
+        "reconstruct",
+        scan,
+        "-o",
+        str(tmp_path / "out"),
+        "--resolution",
+        "24",
+        "--json",
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    for path in map(Path, report["files"]):
+        assert path.stat().st_size > 0
+    vertices = read_points(tmp_path / "out" / "ball_double.ply")
+    assert np.abs(np.linalg.norm(vertices - [1000, 0, 0], axis=1) - 1).max() < 0.2
+
+
+def test_a_real_process_refuses_and_cancels(scan, tmp_path):
+    command = [sys.executable, "-m", "core", "reconstruct", scan, "-o", str(tmp_path / "out")]
+    done = subprocess.run([*command, "--resolution", "0"], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "resolution is 0" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+    running = subprocess.Popen([*command, "--resolution", "192"], cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    while running.poll() is None and not (tmp_path / "out").exists():  # made once the scan is read and the work begins
+        time.sleep(0.02)
+    time.sleep(0.2)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=120)
+    assert running.returncode == 130
+    assert err.count("\n") == 1
+    assert os.listdir(tmp_path / "out") == []
