@@ -105,7 +105,7 @@ def dome_light(vertices: np.ndarray, faces: np.ndarray, key, up, lights: int = 9
     key, up = (np.asarray(d, float) / np.linalg.norm(d) for d in (key, up))
     total = np.zeros(len(vertices))
     brightness = 0.0
-    for light in _sphere(lights):
+    for light in evenly_spread_directions(lights):
         strength = 0.3 + 0.3 * (light @ up) + 2.5 * max(0.0, light @ key) ** 3
         camera = Camera.facing(vertices, light, _across(light), (400, 400))
         seen = camera.project(vertices)
@@ -169,7 +169,7 @@ def _barycentric(corners: np.ndarray, column: np.ndarray, row: np.ndarray) -> np
     return np.stack([first, second, 1 - first - second], axis=1)
 
 
-def _sphere(count: int) -> np.ndarray:
+def evenly_spread_directions(count: int) -> np.ndarray:
     """(count,3) directions spread evenly over the sphere, on a Fibonacci spiral."""
     z = 1 - (2 * np.arange(count) + 1) / count
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)

@@ -5,6 +5,7 @@ from scipy.spatial import KDTree
 
 NEIGHBOURS = 16
 _WIDTH = 1.5  # of the Gaussian weight, local spacings
+_ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting
 _ALIGNED = 0.5  # least |n_i . n_j| of neighbours that count
 _STIFFNESS = 1e-3
 
@@ -34,7 +35,10 @@ def bending(points, normals, frames, spacing, tree: KDTree) -> np.ndarray:
     counted = np.abs(agreement) > _ALIGNED
     slope = -tilt / np.where(counted, agreement, 1.0)[..., None]
     squared = np.einsum("nki,nki->nk", step, step)
-    weight = np.where(counted, np.exp(-squared / (_WIDTH * spacing[:, None]) ** 2), 0.0)
+    height_back = np.einsum("nki,nki->nk", step, normals[neighbours])
+    apart = (z**2 + height_back**2) / squared
+    decay = squared / (_WIDTH * spacing[:, None]) ** 2 + _ONE_SHEET * apart
+    weight = np.where(counted, np.exp(-decay), 0.0)
 
     zero = np.zeros_like(x)
     distance = np.sqrt(squared)

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core.field.curvature import bending, tangent_frames
+from core.points import local_spacing
+from tests import shapes
+
+
+def forms(points, normals):
+    spacing = local_spacing(points)
+    return bending(points, normals, tangent_frames(normals), spacing, KDTree(points)), spacing
+
+
+def tangential(normals):
+    return np.eye(3) - normals[:, :, None] * normals[:, None, :]
+
+
+def test_frames_are_orthonormal(random):
+    normals = np.concatenate([random.normal(size=(100, 3)), np.eye(3), -np.eye(3)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = np.concatenate([normals[:, None], tangent_frames(normals)], axis=1)
+    np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)
+
+
+@pytest.mark.parametrize("radius", [0.5, 2.0, 30.0])
+def test_a_sphere_bends_alike_in_every_direction(radius):
+    points = shapes.sphere(1000, radius)
+    form, _ = forms(points, points / radius)
+    np.testing.assert_allclose(form * radius, -tangential(points / radius), atol=0.05)
+
+
+def test_a_cylinder_bends_round_but_not_along():
+    points = shapes.cylinder(2000)
+    normals = points * [1, 1, 0]
+    form, _ = forms(points, normals)
+    middle = np.abs(points[:, 2]) < 0.8
+    around = np.cross(normals, [0, 0, 1])
+    np.testing.assert_allclose(form[middle], -(around[:, :, None] * around[:, None, :])[middle], atol=0.05)
+
+
+def test_a_saddle_bends_both_ways():
+    points = shapes.square(1500)
+    x, y, _ = points.T
+    points = np.column_stack([x, y, (x**2 - y**2) / 2])
+    normals = np.column_stack([-x, y, np.ones_like(x)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    form, _ = forms(points, normals)
+    middle = np.hypot(x, y) < 0.1
+    np.testing.assert_allclose(form[middle], np.broadcast_to(np.diag([1.0, -1, 0]), form[middle].shape), atol=0.1)
+
+
+def test_a_plane_does_not_bend():
+    points = shapes.disc(300)
+    form, _ = forms(points, np.tile([0.0, 0.0, 1.0], (300, 1)))
+    np.testing.assert_allclose(form, 0, atol=1e-9)
+
+
+def test_follows_its_own_normals_sign_and_no_other(random):
+    points = shapes.sphere(500)
+    form, _ = forms(points, points)
+    sign = random.choice([-1.0, 1.0], 500)
+    flipped, _ = forms(points, points * sign[:, None])
+    np.testing.assert_allclose(flipped, form * sign[:, None, None], atol=1e-9)
+
+
+def test_lies_in_the_tangent_plane_and_is_symmetric(random):
+    points = shapes.scattered_sphere(300)
+    normals = points + 0.2 * random.normal(size=points.shape)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    form, _ = forms(points, normals)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", form, normals), 0, atol=1e-9)
+    np.testing.assert_allclose(form, form.transpose(0, 2, 1), atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_is_never_tighter_than_the_spacing(seed):
+    random = np.random.default_rng(seed)
+    points, normals = random.normal(size=(2, 200, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    form, spacing = forms(points, normals)
+    assert (np.linalg.norm(form, axis=(1, 2)) * spacing).max() < 1 + 1e-9

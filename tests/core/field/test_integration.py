@@ -1,0 +1,151 @@
+"""Distances in the whole box, against closed forms and, by libigl, against finely meshed shapes."""
+
+import igl
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core import Cancelled, Settings, reconstruct
+from core.field.grid import fit_grid
+from core.field.integration import integrate
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from tests import shapes
+
+
+def off(run, true):
+    """|u - d| in cells at every node."""
+    return np.abs(run.field.values.ravel() - true(shapes.node_positions(run.field))) / run.field.spacing
+
+
+def moebius_mesh(around=400, across=20, width=0.6):
+    """A fine triangle mesh of shapes.moebius, cut open along one line."""
+    turn, offset = np.meshgrid(
+        np.linspace(0, 2 * np.pi, around + 1), np.linspace(-width / 2, width / 2, across + 1), indexing="ij"
+    )
+    radius = 1 + offset * np.cos(turn / 2)
+    vertices = np.stack([radius * np.cos(turn), radius * np.sin(turn), offset * np.sin(turn / 2)], axis=-1).reshape(
+        -1, 3
+    )
+    corner = (np.arange(around)[:, None] * (across + 1) + np.arange(across)).ravel()
+    a, b, c, d = corner, corner + 1, corner + across + 2, corner + across + 1
+    return vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+@pytest.mark.parametrize(
+    ("run", "true", "mean", "largest"),
+    [
+        ("sphere_run", shapes.sphere_distance, 0.03, 0.5),
+        ("torus_run", shapes.torus_distance, 0.03, 0.5),
+        ("disc_run", shapes.disc_distance, 0.15, 1.0),
+        ("hemisphere_run", shapes.hemisphere_distance, 0.06, 0.8),
+    ],
+)
+def test_everywhere_in_the_box_u_is_the_distance(run, true, mean, largest, request):
+    error = off(request.getfixturevalue(run), true)
+    assert error.mean() < mean
+    assert error.max() < largest
+
+
+def test_on_a_moebius_band_u_is_the_distance_to_its_mesh(moebius_run):
+    vertices, faces = moebius_mesh()
+    error = off(moebius_run, lambda x: np.sqrt(igl.point_mesh_squared_distance(x, vertices, faces)[0]))
+    assert error.mean() < 0.1
+    assert np.percentile(error, 99) * moebius_run.field.spacing < 0.6 * moebius_run.report["spacing"]
+
+
+def test_a_hemisphere_does_not_grow_shut(hemisphere_run):
+    """Below its open rim u is the distance to the rim, where the paper's diffusion leaves it near zero. The rim
+    itself is known to about half a local spacing."""
+    hair = 0.6 * hemisphere_run.report["spacing"]
+    z = np.linspace(-0.12, 0.6, 40)
+    x = np.column_stack([0 * z, 0 * z, z])
+    found, true = hemisphere_run.field.sample(x), shapes.hemisphere_distance(x)
+    np.testing.assert_allclose(found, true, atol=hair)
+    turn = np.linspace(0, 2 * np.pi, 50)
+    below = np.column_stack([np.cos(turn), np.sin(turn), np.full(50, -0.12)])
+    np.testing.assert_allclose(hemisphere_run.field.sample(below), 0.12, atol=hair)
+
+
+def test_u_rises_from_a_sample_by_at_most_a_unit_slope(torus_run):
+    """A distance is 1-Lipschitz; between neighbouring nodes u changes by hardly more than a cell."""
+    values = torus_run.field.values
+    for axis in range(3):
+        assert np.abs(np.diff(values, axis=axis)).max() < 1.15 * torus_run.field.spacing
+
+
+def test_between_two_sheets_u_falls_to_zero_at_both(sheets_run):
+    x = np.column_stack([np.random.default_rng(0).uniform(-0.7, 0.7, (500, 2)), np.zeros(500)])
+    for z, expected in ((0.0, 0.05), (0.05, 0.0), (-0.05, 0.0), (0.15, 0.1)):
+        found = sheets_run.field.sample(x + np.array([0, 0, z]))
+        np.testing.assert_allclose(found, expected, atol=0.55 * sheets_run.field.spacing)
+    between = sheets_run.field.sample(x)
+    assert between.min() > 0.4 * 0.05
+
+
+def test_at_a_junction_u_is_the_distance_to_the_nearest_sheet():
+    run = reconstruct(shapes.junction(2000), Settings(resolution=48, surface="none"))
+
+    def true(x):
+        beside, above = np.maximum(np.abs(x[:, 1]) - 1, 0), np.maximum(np.maximum(-x[:, 2], x[:, 2] - 1), 0)
+        return np.minimum(shapes.square_distance(x), np.linalg.norm([x[:, 0], beside, above], axis=0))
+
+    error = off(run, true)
+    assert error.mean() < 0.15
+    assert np.percentile(error, 99) < 0.8
+
+
+@pytest.mark.parametrize(("bridge", "closed"), [(3.0, False), (8.0, True)])
+def test_a_hole_narrower_than_bridge_closes_and_a_wider_one_stays_open(bridge, closed):
+    radius = 0.16
+    points = shapes.holed_square(1000, radius)
+    assert 3.0 < 2 * radius / np.median(local_spacing(points)) < 8.0
+    run = reconstruct(points, Settings(resolution=48, surface="none", bridge=bridge))
+    middle = run.field.sample([[0, 0, 0]])[0]
+    if closed:
+        assert middle < 0.25 * run.field.spacing
+    else:
+        assert radius - run.report["spacing"] < middle < radius + 0.5 * run.field.spacing
+
+
+@pytest.mark.parametrize("resolution", [16, 32])
+def test_a_coarse_grid_still_holds_the_distance(resolution):
+    run = reconstruct(shapes.sphere(1500), Settings(resolution=resolution, surface="none"))
+    assert off(run, shapes.sphere_distance).mean() < 0.05
+
+
+def test_sparse_samples_are_enough_for_a_smooth_shape():
+    run = reconstruct(shapes.sphere(150), Settings(resolution=48, surface="none"))
+    assert off(run, shapes.sphere_distance).mean() < 0.1
+
+
+class TestAlone:
+    """The stage by itself, given true normals."""
+
+    @pytest.fixture
+    def stage(self):
+        points = shapes.sphere(400)
+        return fit_local_surface(points, points, local_spacing(points), 3.0), fit_grid(points, 32)
+
+    def test_gives_a_value_at_every_node(self, stage):
+        surface, grid = stage
+        values = integrate(surface, grid)
+        assert (values.shape, values.dtype) == (grid.shape, np.float32)
+        x = grid.positions(np.arange(values.size))
+        assert (values.ravel() <= KDTree(surface.points).query(x)[0] + 0.5 * grid.spacing).all()
+        np.testing.assert_allclose(values.ravel(), shapes.sphere_distance(x), atol=0.5 * grid.spacing)
+
+    def test_near_the_surface_it_is_the_projection_distance(self, stage):
+        surface, grid = stage
+        values = integrate(surface, grid)
+        near = np.flatnonzero(values < grid.spacing)
+        projected = surface.project(grid.positions(near)).distance
+        np.testing.assert_allclose(values.flat[near], projected, atol=1e-6)
+
+    def test_reports_in_order_and_stops_when_told(self, stage):
+        seen = []
+        integrate(*stage, lambda fraction, _: seen.append(fraction))
+        assert seen == sorted(seen)
+        assert 0 <= seen[0] <= seen[-1] <= 1
+        with pytest.raises(Cancelled):
+            integrate(*stage, lambda fraction, _: fraction < seen[-1])

@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core import Cancelled
+from core.field.local_surface import CHUNK, fit_local_surface
+from core.points import local_spacing
+from tests import shapes
+
+UP = np.array([0.0, 0.0, 1.0])
+SHAPES = {
+    "sphere": (shapes.sphere(1500), shapes.sphere(1500), shapes.sphere_distance),
+    "random sphere": (shapes.scattered_sphere(1500), shapes.scattered_sphere(1500), shapes.sphere_distance),
+    "hemisphere": (shapes.hemisphere(1500), shapes.hemisphere(1500), shapes.hemisphere_distance),
+    "disc": (shapes.disc(800), np.tile(UP, (800, 1)), shapes.disc_distance),
+    "cylinder": (shapes.cylinder(2000), shapes.cylinder(2000) * [1, 1, 0], shapes.cylinder_distance),
+}
+
+
+def fit(points, normals, bridge=3.0):
+    return fit_local_surface(points, normals, local_spacing(points), bridge)
+
+
+def around(points, random, width=0.6, n=3000):
+    """Queries spread a local spacing or so around the samples."""
+    spacing = np.median(local_spacing(points))
+    return points[random.choice(len(points), n)] + width * spacing * random.normal(size=(n, 3))
+
+
+@pytest.mark.parametrize(("points", "normals", "true"), SHAPES.values(), ids=SHAPES.keys())
+def test_distance_and_foot_are_those_of_the_closed_form(points, normals, true, random):
+    x = around(points, random)
+    found = fit(points, normals).project(x)
+    spacing = np.median(local_spacing(points))
+    error = np.abs(found.distance - true(x)) / spacing
+    assert error.mean() < 0.005
+    assert np.percentile(error, 95) < 0.03
+    assert error.max() < 0.6
+    np.testing.assert_allclose(np.linalg.norm(found.step, axis=1), found.distance, atol=1e-9)
+    assert np.percentile(true(x - found.step), 95) < 0.05 * spacing
+
+
+@pytest.mark.parametrize(("points", "normals", "true"), SHAPES.values(), ids=SHAPES.keys())
+def test_never_beyond_the_nearest_sample_and_never_negative(points, normals, true, random):
+    x = around(points, random, width=2)
+    distance = fit(points, normals).project(x).distance
+    assert distance.min() >= 0
+    assert (distance <= KDTree(points).query(x)[0] + 1e-12).all()
+
+
+def test_samples_lie_on_the_surface():
+    points = shapes.torus(2000)
+    ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
+    assert fit(points, (points - ring) / 0.4).project(points).distance.max() < 0.01 * np.median(local_spacing(points))
+
+
+def test_signs_of_normals_do_not_matter(random):
+    points, normals, _ = SHAPES["hemisphere"]
+    x = around(points, random)
+    here = fit(points, normals).project(x)
+    there = fit(points, normals * random.choice([-1.0, 1.0], (len(points), 1))).project(x)
+    np.testing.assert_allclose(there.distance, here.distance, atol=1e-9)
+    np.testing.assert_allclose(there.step, here.step, atol=1e-9)
+
+
+def test_moves_and_scales_with_the_points(random):
+    points, normals, _ = SHAPES["hemisphere"]
+    x = around(points, random)
+    rotation, shift, factor = shapes.random_rotation(5), np.array([1.0, 2.0, -3.0]), 37.0
+    here = fit(points, normals).project(x)
+    there = fit(factor * points @ rotation.T + shift, normals @ rotation.T).project(factor * x @ rotation.T + shift)
+    off = np.abs(there.distance / factor - here.distance)
+    assert (off < 1e-9).mean() > 0.999
+    assert off.max() < 0.1 * np.median(local_spacing(points))
+
+
+def test_the_order_of_the_points_does_not_matter(random):
+    points, normals, _ = SHAPES["random sphere"]
+    order = random.permutation(len(points))
+    x = around(points, random)
+    here, there = fit(points, normals).project(x), fit(points[order], normals[order]).project(x)
+    np.testing.assert_allclose(there.distance, here.distance, atol=1e-9)
+
+
+def test_each_query_is_on_its_own(random):
+    """Queries are worked through in chunks; how they fall into them does not matter."""
+    points, normals, _ = SHAPES["disc"]
+    surface = fit(points, normals)
+    x = around(points, random, n=CHUNK + 500)
+    whole = surface.project(x)
+    part = surface.project(x[CHUNK - 250 : CHUNK + 250])
+    np.testing.assert_array_equal(part.distance, whole.distance[CHUNK - 250 : CHUNK + 250])
+    np.testing.assert_array_equal(part.step, whole.step[CHUNK - 250 : CHUNK + 250])
+
+
+def test_past_the_rim_of_a_disc_the_foot_lies_on_the_rim():
+    points, normals, _ = SHAPES["disc"]
+    spacing = np.median(local_spacing(points))
+    turn = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    past = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1) * (1 + 2 * spacing) + [0, 0, spacing]
+    found = fit(points, normals).project(past)
+    assert found.past_rim.all()
+    foot = np.linalg.norm(past - found.step, axis=1)
+    assert np.abs(foot - 1).max() < 0.6 * spacing
+    over = fit(points, normals).project(past * [0.5, 0.5, 1])
+    assert not over.past_rim.any()
+    np.testing.assert_allclose(over.distance, spacing, rtol=1e-6)
+
+
+def test_sheets_closer_than_the_spacing_do_not_disturb_each_other(random):
+    """From either side of a sheet up to the middle half of the gap, where samples of both are nearest by turns."""
+    gap = 0.08
+    points = shapes.sheets(1000, gap)
+    assert np.median(local_spacing(points)) > gap
+    height = gap * random.uniform(0.25, 1, 2000) * random.choice([-1, 1], 2000)
+    x = np.column_stack([random.uniform(-0.7, 0.7, (2000, 2)), height])
+    distance = fit(points, np.tile(UP, (len(points), 1))).project(x).distance
+    np.testing.assert_allclose(distance, np.abs(np.abs(height) - gap / 2), atol=0.02 * gap)
+
+
+def test_no_queries():
+    points, normals, _ = SHAPES["disc"]
+    assert fit(points, normals).project(np.empty((0, 3))).distance.shape == (0,)
+
+
+def test_can_be_cancelled():
+    points, normals, _ = SHAPES["disc"]
+    with pytest.raises(Cancelled):
+        fit(points, normals).project(points, lambda *_: False)

@@ -1,0 +1,43 @@
+import numpy as np
+import pytest
+
+from core import Mesh
+
+TETRAHEDRON = Mesh(
+    np.concatenate([np.zeros((1, 3)), np.eye(3)]),
+    np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32),
+)
+
+
+def test_a_closed_mesh_has_two_faces_at_each_edge():
+    edges, counts = TETRAHEDRON.edge_counts()
+    assert edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    assert counts.tolist() == [2] * 6
+
+
+def test_a_border_edge_has_one():
+    edges, counts = Mesh(TETRAHEDRON.vertices, TETRAHEDRON.faces[:3]).edge_counts()
+    assert {tuple(edge) for edge in edges[counts == 1]} == {(1, 2), (2, 3), (1, 3)}
+
+
+def test_a_junction_edge_has_more():
+    vertices = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0]], float)
+    edges, counts = Mesh(vertices, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], np.int32)).edge_counts()
+    assert dict(zip(map(tuple, edges.tolist()), counts.tolist(), strict=True))[0, 1] == 3
+    assert sorted(counts.tolist()) == [1] * 6 + [3]
+
+
+def test_areas_in_closed_form():
+    np.testing.assert_allclose(TETRAHEDRON.face_areas(), [0.5, 0.5, 0.5, np.sqrt(3) / 2])
+
+
+@pytest.mark.parametrize("factor", [1e-3, 7.0])
+def test_areas_grow_with_the_square(factor):
+    scaled = Mesh(TETRAHEDRON.vertices * factor + 5, TETRAHEDRON.faces)
+    np.testing.assert_allclose(scaled.face_areas(), TETRAHEDRON.face_areas() * factor**2)
+
+
+def test_no_faces():
+    empty = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
+    edges, counts = empty.edge_counts()
+    assert (edges.shape, counts.shape, empty.face_areas().shape) == ((0, 2), (0,), (0,))

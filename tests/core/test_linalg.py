@@ -1,0 +1,81 @@
+"""Against numpy.linalg.eigh."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from core.linalg import outer, principal_axes
+from tests.shapes import random_rotation
+
+
+def matrices(tensors):
+    return tensors[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+
+
+def components(matrix):
+    return matrix[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+
+
+def residual(tensors):
+    """|A v - lambda v| relative to the size of A, largest lambda by eigh."""
+    axes, values = principal_axes(tensors)
+    full = matrices(tensors)
+    expected = np.linalg.eigvalsh(full)[:, ::-1]
+    size = np.maximum(np.abs(expected).max(axis=1), np.finfo(float).tiny)
+    np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1, atol=1e-9)
+    np.testing.assert_allclose(values / size[:, None], expected / size[:, None], atol=1e-7)
+    assert (np.diff(values, axis=1) <= 1e-7 * size[:, None]).all()
+    off = np.einsum("mij,mj->mi", full, axes) - expected[:, :1] * axes
+    return np.linalg.norm(off, axis=1) / size
+
+
+def test_outer_is_v_v_transposed(random):
+    v = random.normal(size=(4, 5, 3))
+    np.testing.assert_allclose(matrices(outer(v).reshape(-1, 6)), (v[..., None] * v[..., None, :]).reshape(-1, 3, 3))
+
+
+def test_random_tensors(random):
+    assert residual(random.normal(size=(10000, 6))).max() < 1e-6
+
+
+@pytest.mark.parametrize("factor", [1e-60, 1e-12, 1e12, 1e60])
+def test_any_scale(factor, random):
+    tensors = random.normal(size=(500, 6))
+    assert residual(tensors * factor).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "eigenvalues",
+    [(1, 0, 0), (1, 1, 0), (0, 0, -1), (3, 2, 2), (3, 3, 3), (0, 0, 0), (-1, -2, -3), (3, 3 - 1e-9, 2), (1, 1e-9, 0)],
+)
+def test_repeated_and_nearly_repeated_eigenvalues(eigenvalues):
+    rotations = np.stack([np.eye(3), *(random_rotation(seed) for seed in range(200))])
+    tensors = components(rotations @ np.diag(np.array(eigenvalues, float)) @ rotations.transpose(0, 2, 1))
+    assert residual(tensors).max() < 1e-6
+
+
+@given(arrays(np.float64, (3, 6), elements=st.sampled_from([0.0, 1.0, -1.0, 0.5, 1e-8, -1e-8, 1e-16, 3.0])))
+def test_awkward_tensors(tensors):
+    assert residual(tensors).max() < 1e-6
+
+
+def test_a_well_separated_axis_is_the_one_of_eigh(random):
+    axis = random.normal(size=(1000, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    noise = random.normal(size=(1000, 6))
+    found, _ = principal_axes(10 * outer(axis) + 0.1 * noise)
+    expected = np.linalg.eigh(matrices(10 * outer(axis) + 0.1 * noise))[1][:, :, 2]
+    np.testing.assert_allclose(np.abs(np.einsum("mi,mi->m", found, expected)), 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("tilt", [1e-6, 1e-9, 1e-12, 1e-15])
+def test_axes_almost_along_a_coordinate(tilt):
+    vectors = np.concatenate([np.roll([1.0, tilt, 2 * tilt], k)[None] for k in range(3)])
+    assert residual(3 * outer(vectors) + components(np.diag([0.3, 0.2, 0.1]))).max() < 1e-9
+
+
+def test_no_tensors_give_no_axes():
+    axes, values = principal_axes(np.empty((0, 6)))
+    assert axes.shape == values.shape == (0, 3)

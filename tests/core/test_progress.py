@@ -1,0 +1,59 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from core import Cancelled, VADError
+from core.progress import Progress
+
+fractions = st.floats(0, 1)
+
+
+def recorder():
+    seen = []
+    return seen, lambda fraction, text: seen.append((fraction, text))
+
+
+@given(fractions, fractions, fractions, fractions, fractions)
+def test_nested_parts_map_onto_the_whole(a, b, c, d, at):
+    seen, callback = recorder()
+    Progress(callback).part(a, b, "outer").part(c, d)(at)
+    ((fraction, text),) = seen
+    assert fraction == pytest.approx(a + (b - a) * (c + (d - c) * at), abs=1e-12)
+    assert text == "outer"
+
+
+def test_a_part_can_be_renamed():
+    seen, callback = recorder()
+    Progress(callback).part(0, 0.5, "one").part(0, 1, "two")(1)
+    assert seen == [(0.5, "two")]
+
+
+@pytest.mark.parametrize("answer", [None, True, 0, ""])
+def test_only_false_cancels(answer):
+    Progress(lambda *_: answer).part(0, 1, "field")(0.5)
+
+
+def test_false_cancels_and_names_the_stage():
+    with pytest.raises(Cancelled, match=r"field.*nothing was written"):
+        Progress(lambda *_: False).part(0, 1, "field")(0.5)
+    assert issubclass(Cancelled, VADError)
+
+
+def test_nothing_to_call_is_fine():
+    Progress.of(None).part(0.2, 0.8, "field")(0.5)
+
+
+def test_of_keeps_a_slice_and_wraps_a_callback():
+    seen, callback = recorder()
+    part = Progress(callback).part(0.5, 1.0)
+    assert Progress.of(part) is part
+    Progress.of(callback)(0.25)
+    assert seen == [(0.25, "")]
+
+
+def test_what_the_callback_raises_comes_through():
+    def broken(*_):
+        raise RuntimeError("broken")
+
+    with pytest.raises(RuntimeError, match="broken"):
+        Progress(broken)(0.5)
