@@ -5,6 +5,8 @@ A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axi
 
 import numpy as np
 
+_DISTINCT = 1e-5  # below this the two largest eigenvalues are too close for the closed form
+
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 
 
@@ -46,13 +48,12 @@ def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     every = np.arange(len(tensors))
     axes = crosses[every, best]
     length = np.sqrt(lengths[every, best])
-    found = length > 1e-14
+    found = length > _DISTINCT
     axes[found] /= length[found, None]
-    axes[~found] = _perpendicular_free(tensors[~found])
+    axes[~found] = _by_lapack(tensors[~found])
     return axes, values
 
 
-def _perpendicular_free(tensors):
-    """Axes where the cross products vanish: the tensor is (nearly) a rank-one change of the identity."""
+def _by_lapack(tensors):
     matrices = tensors[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
     return np.linalg.eigh(matrices)[1][:, :, 2]

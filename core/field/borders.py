@@ -1,8 +1,11 @@
-"""Where the surface ends: rims of open sheets, and gaps that are to be bridged.
+"""Where patches end: at rims of open sheets, at creases, and not at gaps that are to be bridged.
 
 The printed method has no borders: on a flat patch the diffused axes are constant and the zero set is the whole plane.
 Here a sample whose neighbours leave a wide gap around it, seen in its tangent plane, is at a rim. Across the gap the
 sheet ends a little past the two neighbours that bound it, unless the gap is narrower than the bridging length.
+
+Neighbours beyond a crease are unfolded about the line where the two tangent planes meet, so they fill gaps like any
+other, and that line is where the patch ends, unless the sheet goes on straight (two sheets that cross).
 """
 
 from dataclasses import dataclass
@@ -16,15 +19,16 @@ DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
 BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
 
-_PARALLEL = 0.7  # |n_i . n_j| above which two samples lie on one sheet or on two parallel ones
-_STEP = 0.35  # parallel samples further than this off each other's plane (share of their distance) are on two sheets
-_FOLD = 0.8  # samples beyond a crease may lie this far off the plane (share of their lateral distance)
-_FOLD_REACH = 1.2  # and must be this close, local spacings
+_FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
+_STEP = 0.35  # they may be off each other's plane by this share of their distance
+_FOLD = 0.87  # largest |n_i . n_j| of neighbours with a fold between them
+_FOLD_REACH = 1.5  # both are this close to the crease, local spacings
+_STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
 
 
 @dataclass(frozen=True)
 class Rims:
-    """The widest gap around each sample, in its tangent plane.
+    """The widest gap around each sample and the creases beside it, in its tangent plane.
 
     gap       : (n,) bool, whether there is one
     bridged   : (n,) bool, whether the surface goes on across it
@@ -32,6 +36,8 @@ class Rims:
     opening   : (n,) float64, cosine of half its angle
     ends      : (n,2,3) float64, steps to the two neighbours that bound it
     reach     : (n,) float64, how far the patch covers a bridged gap
+    crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ
+    limit     : (n,2) float64, distance to them, inf where there is none
     """
 
     gap: np.ndarray
@@ -40,6 +46,8 @@ class Rims:
     opening: np.ndarray
     ends: np.ndarray
     reach: np.ndarray
+    crease: np.ndarray
+    limit: np.ndarray
 
 
 def find_rims(points, normals, frames, spacing, tree: KDTree, bridge: float) -> Rims:
@@ -51,8 +59,11 @@ def find_rims(points, normals, frames, spacing, tree: KDTree, bridge: float) -> 
     n, k = len(points), min(NEIGHBOURS, len(points) - 1)
     neighbours = tree.query(points, k=k + 1, workers=-1)[1][:, 1:]
     step = points[neighbours] - points[:, None]
-    x, y = np.moveaxis(np.einsum("nki,nai->nka", step, frames), 2, 0)
-    same = _one_sheet(step, normals, normals[neighbours], spacing)
+    flat = _level(step, normals[:, None], normals[neighbours]) & _aligned(normals[:, None], normals[neighbours], _FLAT)
+    folded, lateral, toward, line = _unfolded(step, normals, normals[neighbours], spacing, ~flat)
+    crease, limit = _creases(step, flat, folded, toward, line, spacing)
+    x, y = np.moveaxis(np.einsum("nki,nai->nka", np.where(folded[..., None], lateral, step), frames), 2, 0)
+    same = flat | folded
 
     angle = np.where(same, np.arctan2(y, x), np.inf)
     order = np.argsort(angle, axis=1)
@@ -69,7 +80,7 @@ def find_rims(points, normals, frames, spacing, tree: KDTree, bridge: float) -> 
     start = np.where(count > 0, angle[every, widest], 0.0)
 
     bounding = np.stack([order[every, widest], order[every, np.where(widest == last, 0, widest + 1) % k]], axis=1)
-    flat = np.stack([np.take_along_axis(x, bounding, axis=1), np.take_along_axis(y, bounding, axis=1)], axis=2)
+    ends = np.stack([np.take_along_axis(x, bounding, axis=1), np.take_along_axis(y, bounding, axis=1)], axis=2)
     middle = start + width / 2
     outward = np.einsum("na,nai->ni", np.stack([np.cos(middle), np.sin(middle)], axis=1), frames)
     gap = (width > GAP) & (count > 0)
@@ -78,7 +89,8 @@ def find_rims(points, normals, frames, spacing, tree: KDTree, bridge: float) -> 
     distance[rows] = _distance_across(rows, points, normals, outward, spacing, tree, bridge)
     bridged = np.isfinite(distance)
     reach = np.where(bridged, np.maximum(DISC * spacing, BRIDGED * np.where(bridged, distance, 0.0)), 0.0)
-    return Rims(gap, bridged, outward, np.cos(width / 2), np.einsum("nea,nai->nei", flat, frames), reach)
+    ends = np.einsum("nea,nai->nei", ends, frames)
+    return Rims(gap, bridged, outward, np.cos(width / 2), ends, reach, crease, limit)
 
 
 def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray]:
@@ -101,19 +113,66 @@ def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray
     rows = tuple(axis[worse] for axis in at_rim)
     beyond[rows] = past[worse]
     step[rows] = to_edge[worse] * (past[worse] / edge_distance[worse])[:, None]
+
+    at_crease = np.nonzero(np.isfinite(rims.limit[sample, 0]))
+    creased = sample[at_crease]
+    across = np.einsum("mi,mci->mc", lateral[at_crease], rims.crease[creased])
+    over = np.einsum("mc,mci->mi", np.maximum(across - rims.limit[creased], 0.0), rims.crease[creased])
+    past = np.linalg.norm(over, axis=1)
+    worse = past > beyond[at_crease]
+    rows = tuple(axis[worse] for axis in at_crease)
+    beyond[rows], step[rows] = past[worse], over[worse]
     return beyond, step
 
 
-def _one_sheet(step, normals, neighbour_normals, spacing):
-    """(n,k) bool: neighbours over which the surface goes on, flat or folded, rather than those of another sheet."""
-    distance = np.linalg.norm(step, axis=2)
-    height = np.abs(np.einsum("nki,ni->nk", step, normals))
-    height_back = np.abs(np.einsum("nki,nki->nk", step, neighbour_normals))
-    parallel = np.abs(np.einsum("nki,ni->nk", neighbour_normals, normals)) > _PARALLEL
-    flat = np.maximum(height, height_back) < _STEP * distance
-    lateral = np.sqrt(np.maximum(distance**2 - height**2, 0.0))
-    folded = (height < _FOLD * lateral) & (distance < _FOLD_REACH * spacing[:, None])
-    return np.where(parallel, flat, folded)
+def _level(step, normals, other_normals):
+    """Whether both ends of steps (...,3) lie close to each other's tangent plane."""
+    height = np.maximum(
+        np.abs(np.einsum("...i,...i->...", step, normals)), np.abs(np.einsum("...i,...i->...", step, other_normals))
+    )
+    return height < _STEP * np.linalg.norm(step, axis=-1)
+
+
+def _aligned(normals, other_normals, least):
+    return np.abs(np.einsum("...i,...i->...", normals, other_normals)) > least
+
+
+def _unfolded(step, normals, other_normals, spacing, candidate):
+    """Neighbours beyond a fold, laid out in the sample's tangent plane.
+
+    Returns whether each is one (n,k), its unfolded step (n,k,3), the unit tangent towards the crease (n,k,3) and the
+    distance to the crease (n,k).
+    """
+    cosine = np.einsum("nki,ni->nk", other_normals, normals)
+    across = other_normals - cosine[..., None] * normals[:, None]
+    sine = np.linalg.norm(across, axis=2)
+    folded = candidate & (np.abs(cosine) < _FOLD)
+    sine = np.where(folded, sine, 1.0)
+    across = across / sine[..., None]
+    line = np.einsum("nki,nki->nk", step, other_normals) / sine
+    other_line = np.abs(np.einsum("nki,ni->nk", step, normals)) / sine
+    across = across * np.where(line < 0, -1.0, 1.0)[..., None]
+    line = np.abs(line)
+    reach = _FOLD_REACH * spacing[:, None]
+    folded &= (line < reach) & (other_line < reach)
+    along = np.cross(normals[:, None], across)
+    slide = np.einsum("nki,nki->nk", step, along)
+    return folded, (line + other_line)[..., None] * across + slide[..., None] * along, across, line
+
+
+def _creases(step, flat, folded, toward, line, spacing):
+    """The nearest crease and the nearest one in another direction, (n,2,3), with their distances, (n,2)."""
+    margin = line + _STRAIGHT_ON * spacing[:, None]
+    runs = np.einsum("nji,nki->njk", step, toward)
+    crossed = ((runs > margin[:, None]) & flat[:, :, None]).any(axis=1)
+    distance = np.where(folded & ~crossed, line, np.inf)
+    every = np.arange(len(step))
+    first = distance.argmin(axis=1)
+    other = np.einsum("nki,ni->nk", toward, toward[every, first]) < np.cos(np.pi / 4)
+    second = np.where(other, distance, np.inf).argmin(axis=1)
+    chosen = np.stack([first, second], axis=1)
+    limit = np.stack([distance[every, first], np.where(other, distance, np.inf)[every, second]], axis=1)
+    return np.take_along_axis(toward, chosen[..., None], axis=1), limit
 
 
 def _distance_across(rows, points, normals, outward, spacing, tree, bridge):
@@ -127,11 +186,8 @@ def _distance_across(rows, points, normals, outward, spacing, tree, bridge):
         step = points[other] - points[part, None]
         ahead = np.einsum("nki,ni->nk", step, outward[part]) > 0.8 * distance
         near = (distance > 0) & (distance < bridge * spacing[part, None])
-        aligned = np.abs(np.einsum("nki,ni->nk", normals[other], normals[part])) > 0.5
-        height = np.abs(np.einsum("nki,ni->nk", step, normals[part]))
-        height_back = np.abs(np.einsum("nki,nki->nk", step, normals[other]))
-        level = np.maximum(height, height_back) < _STEP * distance
-        across[first : first + chunk] = np.where(ahead & near & aligned & level, distance, np.inf).min(axis=1)
+        sheet = _aligned(normals[part, None], normals[other], 0.5) & _level(step, normals[part, None], normals[other])
+        across[first : first + chunk] = np.where(ahead & near & sheet, distance, np.inf).min(axis=1)
     return across
 
 

@@ -25,23 +25,31 @@ _SLAB = 1 << 18  # nodes
 def integrate(surface: LocalSurface, grid: Grid, progress=None) -> np.ndarray:
     """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples."""
     progress = Progress.of(progress)
-    node = _near_samples(surface, grid)
+    node, bound = _near_samples(surface, grid)
     near = surface.project(grid.positions(node), progress.part(0.05, 0.6))
     inside = near.distance <= BAND * grid.spacing
     node, near = node[inside], near[inside]
     values = _transport(grid, *_settled_feet(surface, grid, node, near, progress.part(0.6, 0.8)), progress.part(0.8, 1.0))
+    np.minimum(values, bound, out=values)
     values.flat[node] = near.distance
     return values
 
 
 def _near_samples(surface, grid):
-    """Flat index of every node that may lie within the band of the patches."""
-    reach = np.maximum(DISC * surface.spacing, surface.rims.reach) / grid.spacing
+    """Flat index of every node that may lie within the band of the patches, and the distance of every node to a sample
+    that is nearest or nearly so, float32 of the grid's shape: more than the distance to the surface can be."""
     home = grid.nearest_nodes(surface.points)
-    reach_at = np.full(grid.shape, -1.0, np.float32)
-    np.maximum.at(reach_at.reshape(-1), home, reach.astype(np.float32))
-    distance, nearest = distance_transform_edt(reach_at < 0, return_indices=True)
-    return np.flatnonzero(distance <= BAND + 0.5 * np.sqrt(3) + reach_at[tuple(nearest)])
+    held = np.full(grid.shape, -1, np.int32)
+    held.flat[home] = np.arange(len(home), dtype=np.int32)
+    reach = np.zeros(grid.shape, np.float32)
+    own = np.maximum(DISC * surface.spacing, surface.rims.reach) / grid.spacing
+    np.maximum.at(reach.reshape(-1), home, own.astype(np.float32))
+    distance, nearest = distance_transform_edt(held < 0, return_indices=True)
+    nearest = np.ravel_multi_index(tuple(nearest), grid.shape)
+    near = np.flatnonzero(distance <= BAND + 0.5 * np.sqrt(3) + reach.flat[nearest])
+    sample = held.flat[nearest]
+    points = surface.points.astype(np.float32)
+    return near, np.concatenate([_lengths(x - points[sample[slab]]) for slab, x in _slabs(grid)])
 
 
 def _settled_feet(surface, grid, node, near, progress):
@@ -64,15 +72,11 @@ def _transport(grid, node, feet, normals, radius, progress):
     row = row[tuple(nearest)]
     del nearest
     discs = feet.astype(np.float32), normals.astype(np.float32), radius.astype(np.float32)
-    x = [(grid.origin[a] + grid.spacing * np.arange(grid.shape[a])).astype(np.float32) for a in range(3)]
     values = np.empty(grid.shape, np.float32)
-    thickness = max(1, _SLAB // (grid.shape[1] * grid.shape[2]))
     for turn in range(_ROUNDS):
         held = row.copy()
-        for first in range(0, grid.shape[0], thickness):
-            progress((turn + first / grid.shape[0]) / _ROUNDS)
-            slab = slice(first, min(first + thickness, grid.shape[0]))
-            at = np.stack(np.meshgrid(x[0][slab], x[1], x[2], indexing="ij"), axis=-1)
+        for slab, at in _slabs(grid):
+            progress((turn + slab.start / grid.shape[0]) / _ROUNDS)
             best = _distance_to_discs(at, *discs, row[slab])
             for other in _neighbours(row, slab):
                 distance = _distance_to_discs(at, *discs, other)
@@ -82,6 +86,19 @@ def _transport(grid, node, feet, normals, radius, progress):
             values[slab] = best
         row = held
     return values
+
+
+def _slabs(grid):
+    """Slices of the first axis and the positions of their nodes, (s,ny,nz,3) float32, a bounded number at a time."""
+    x = [(grid.origin[a] + grid.spacing * np.arange(grid.shape[a])).astype(np.float32) for a in range(3)]
+    thickness = max(1, _SLAB // (grid.shape[1] * grid.shape[2]))
+    for first in range(0, grid.shape[0], thickness):
+        slab = slice(first, min(first + thickness, grid.shape[0]))
+        yield slab, np.stack(np.meshgrid(x[0][slab], x[1], x[2], indexing="ij"), axis=-1)
+
+
+def _lengths(vectors):
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
 def _distance_to_discs(x, centres, normals, radius, row):

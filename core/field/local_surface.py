@@ -16,6 +16,8 @@ UNCOVERED = 1.5  # the surface is never further from its nearest sample than thi
 
 _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
 _MEMBERSHIP = 8.0  # how fast samples off each other's plane stop counting as one sheet
+_OTHER_SHEETS = 2  # at most, beside that of the nearest sample
+_TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
 _MEMBER = 0.3  # least membership of samples whose patch may cover a query
 
 
@@ -41,22 +43,25 @@ class LocalSurface:
     """Quadratic patches with rims, blended by the diffusion kernels.
 
     points, normals : (n,3) float64     spacing : (n,) float64, local spacing     bend : (n,3,3) float64
+    confidence      : (n,) float64 in [0,1], of the normals
     """
 
     points: np.ndarray
     normals: np.ndarray
     spacing: np.ndarray
     bend: np.ndarray
+    confidence: np.ndarray
     rims: Rims
     tree: KDTree
 
     def project(self, x: np.ndarray, progress=None) -> "Projection":
         """Distances and foot points of queries (m,3) close to the surface.
 
-        The projection distance of the paper (section 3.1), blended: tau minimises, over the nearest samples of the
-        nearest sheet, the diffusion-weighted sum of squared offsets from their patches when the query is moved by tau
-        along the fused axis. Past a rim the lateral distance to the nearest patch is added at a right angle. Accurate
-        within a few local spacings of the surface; never more than the distance to the nearest sample.
+        The projection distance of the paper (section 3.1), blended: tau minimises, over the samples of one sheet near
+        the query, the diffusion-weighted sum of squared offsets from their patches when the query is moved by tau
+        along the fused axis. Past a rim the lateral distance to the nearest patch is added at a right angle. Of the
+        sheets that the nearest samples belong to, the closest counts. Accurate within a few local spacings of the
+        surface; never more than the distance to the nearest sample.
         """
         progress = Progress.of(progress)
         found = Projection(np.empty(len(x)), np.empty((len(x), 3)), np.empty(len(x), bool))
@@ -70,14 +75,31 @@ class LocalSurface:
         k = min(NEAREST, len(self.points))
         distance, sample = self.tree.query(x, k=k, workers=-1)
         distance = np.maximum(distance, 1e-9 * self.spacing[sample])
+        found, step, past_rim, member = self._onto_sheet(x, sample, distance, np.zeros(len(x), np.int64))
+        rest = (member <= _MEMBER) & (self.confidence[sample] >= _TRUSTED)
+        for _ in range(_OTHER_SHEETS):
+            row = np.flatnonzero(rest.any(axis=1))
+            anchor = rest[row].argmax(axis=1)
+            other, other_step, other_rim, member = self._onto_sheet(x[row], sample[row], distance[row], anchor)
+            closer = other < found[row]
+            chosen = row[closer]
+            found[chosen], step[chosen], past_rim[chosen] = other[closer], other_step[closer], other_rim[closer]
+            rest[row] &= member <= _MEMBER
+        return found, step, past_rim
+
+    def _onto_sheet(self, x, sample, distance, anchor):
+        """Distance, step and whether past a rim, for the sheet of each query's sample number `anchor` (m,); and how
+        surely each sample belongs to that sheet, (m,k)."""
+        every = np.arange(len(x))
         spacing, normals = self.spacing[sample], self.normals[sample]
         offset = x[:, None] - self.points[sample]
         height = np.einsum("mki,mki->mk", offset, normals)
         lateral = offset - height[..., None] * normals
 
-        member = self._membership(sample, normals)
+        member = self._membership(sample, normals, anchor)
         kernel, length = kernel_weights(distance, spacing)
         weight = kernel * member
+        weight /= weight.max(axis=1, keepdims=True)
         axis = fused_axes(weight, length, distance, height, normals)
         cosine = np.einsum("mki,mi->mk", normals, axis)
 
@@ -88,34 +110,36 @@ class LocalSurface:
 
         beyond, outward = excess(self.rims, sample, lateral, spacing)
         covers = (np.abs(cosine) > _PARALLEL) & (member > _MEMBER)
-        covers[:, 0] |= ~covers.any(axis=1)
+        covers[every, anchor] |= ~covers.any(axis=1)
         best = np.where(covers, beyond, np.inf).argmin(axis=1)
-        every = np.arange(len(x))
         step = tau[:, None] * axis + outward[every, best]
         found = np.linalg.norm(step, axis=1)
 
-        nearest = sample[:, 0]
-        slack = np.maximum(UNCOVERED * self.spacing[nearest], 1.1 * self.rims.reach[nearest])
-        bounded = np.clip(found, distance[:, 0] - slack, distance[:, 0])
+        own, away = sample[every, anchor], distance[every, anchor]
+        slack = np.maximum(UNCOVERED * self.spacing[own], 1.1 * self.rims.reach[own])
+        bounded = np.clip(found, away - slack, away)
         lifted = bounded > found
-        step[lifted] = offset[lifted, 0]
-        found[lifted] = distance[lifted, 0]
+        step[lifted] = offset[every, anchor][lifted]
+        found[lifted] = away[lifted]
         step *= (bounded / np.maximum(found, np.finfo(float).tiny))[:, None]
-        return bounded, step, beyond[every, best] > 0
+        return bounded, step, beyond[every, best] > 0, member
 
-    def _membership(self, sample, normals):
-        """(m,k) in [0,1]: how surely each sample lies on one sheet with the nearest, from their offsets off each
+    def _membership(self, sample, normals, anchor):
+        """(m,k) in [0,1]: how surely each sample lies on one sheet with the anchor, from their offsets off each
         other's tangent plane relative to their distance; keeps close sheets apart."""
-        between = self.points[sample] - self.points[sample[:, :1]]
+        every = np.arange(len(sample))
+        between = self.points[sample] - self.points[sample[every, anchor]][:, None]
         squared = np.einsum("mki,mki->mk", between, between)
-        off = np.einsum("mki,mi->mk", between, normals[:, 0]) ** 2 + np.einsum("mki,mki->mk", between, normals) ** 2
-        return np.exp(-_MEMBERSHIP * off / np.maximum(squared, np.finfo(float).tiny))
+        height = np.einsum("mki,mi->mk", between, normals[every, anchor])
+        height_back = np.einsum("mki,mki->mk", between, normals)
+        return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(squared, np.finfo(float).tiny))
 
 
-def fit_local_surface(points, normals, spacing, bridge: float) -> LocalSurface:
-    """Patches and rims of samples (n,3) with axes (n,3) and local spacing (n,), gaps up to `bridge` spacings closed."""
+def fit_local_surface(points, normals, confidence, spacing, bridge: float) -> LocalSurface:
+    """Patches and rims of samples (n,3) with axes (n,3), their confidence (n,) and local spacing (n,); gaps up to
+    `bridge` spacings are closed."""
     tree = KDTree(points)
     frames = tangent_frames(normals)
     bend = bending(points, normals, frames, spacing, tree)
     rims = find_rims(points, normals, frames, spacing, tree, bridge)
-    return LocalSurface(points, normals, spacing, bend, rims, tree)
+    return LocalSurface(points, normals, spacing, bend, confidence, rims, tree)

@@ -1,6 +1,8 @@
 """The double cover: a closed two-sided mesh that hugs the surface from both sides."""
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
@@ -11,6 +13,7 @@ from .mesh import Mesh
 _ROUNDS = 2
 _CLAMP = 2.0  # cells beyond the offset; farther nodes do not matter and are made background
 _LONGEST_STEP = 2.0  # offsets
+_SAMPLE_AT = 1.5  # cells, a piece of the mesh with no sample this close to a vertex is no surface
 
 
 def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:
@@ -32,7 +35,8 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
         step = surface.project(vertices, progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)).step
         length = np.linalg.norm(step, axis=1, keepdims=True)
         vertices = vertices - step * np.minimum(1.0, _LONGEST_STEP * level / np.maximum(length, np.finfo(float).tiny))
-    return Mesh(vertices, _triangles(vertices, faces).astype(np.int32))
+    mesh = Mesh(vertices, _triangles(vertices, faces).astype(np.int32))
+    return _pieces_with_samples(mesh, surface.tree, _SAMPLE_AT * grid.spacing)
 
 
 def _triangles(vertices, faces):
@@ -53,6 +57,17 @@ def _triangles(vertices, faces):
     other[repeated] = ~other[repeated]
     turned = np.where(other[:, None], np.roll(faces, -1, axis=1), faces)
     return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+
+
+def _pieces_with_samples(mesh, tree, near):
+    """The mesh without the crumbs that the field may leave between sheets."""
+    touched = tree.query(mesh.vertices, distance_upper_bound=near, workers=-1)[0] < np.inf
+    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(mesh.vertices),) * 2)
+    count, piece = connected_components(graph, directed=False)
+    kept = np.bincount(piece, weights=touched, minlength=count)[piece] > 0
+    row = np.cumsum(kept) - 1
+    return Mesh(mesh.vertices[kept], row[mesh.faces[kept[mesh.faces[:, 0]]]].astype(np.int32))
 
 
 def _keys(tail, head, n):

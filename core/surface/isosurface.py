@@ -7,7 +7,8 @@ from ..io.openvdb_module import load_openvdb
 
 
 def isosurface(values: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
-    """The surface where `values` (nx,ny,nz) float32 equals `level`, normals towards larger values.
+    """The surface where `values` (nx,ny,nz) float32 equals `level`, normals towards larger values; closed where it
+    meets the box, beyond which the largest value holds.
 
     Returns vertices (v,3) float64 in grid coordinates (cells) and faces (f,4) or (f,3) int64: quads from OpenVDB's
     dual contouring, closed and edge-manifold, or triangles from scikit-image's marching cubes.
@@ -31,5 +32,6 @@ def _by_marching_cubes(values, level):
             "a surface needs OpenVDB or scikit-image and neither is installed; run inside Blender, "
             "`pip install scikit-image`, or ask for surface='none'"
         ) from error
-    vertices, faces, _, _ = marching_cubes(values, level, gradient_direction="ascent", allow_degenerate=False)
-    return vertices.astype(np.float64), faces.astype(np.int64)
+    padded = np.pad(values, 1, constant_values=values.max())
+    vertices, faces, _, _ = marching_cubes(padded, level, gradient_direction="descent", allow_degenerate=False)
+    return vertices.astype(np.float64) - 1, faces.astype(np.int64)

@@ -114,8 +114,13 @@ def test_defaults_are_those_of_settings(capsys, scan, calls, tmp_path):
 @pytest.mark.parametrize("name", options())
 def test_every_setting_is_an_option(capsys, scan, calls, tmp_path, name):
     field = options()[name]
-    other = field.metadata["choices"][-1] if field.metadata["choices"] else field.metadata["limits"][1]
-    run(capsys, "reconstruct", scan, "-o", tmp_path, f"--{name.replace('_', '-')}", other)
+    option = name.replace("_", "-")
+    if field.type is bool:
+        other, given = not field.default, [f"--no-{option}"]
+    else:
+        other = field.metadata["choices"][-1] if field.metadata["choices"] else field.metadata["limits"][1]
+        given = [f"--{option}", other]
+    run(capsys, "reconstruct", scan, "-o", tmp_path, *given)
     assert calls[0][1] == Settings(**{name: other})
 
 
@@ -206,7 +211,7 @@ def test_help(capsys, arguments):
     text = " ".join(capsys.readouterr().out.split())
     assert "SCAN" in text or "python -m core reconstruct bunny.ply -o out" in text
     for name, field in options().items() if arguments[0] == "reconstruct" else ():
-        assert f"--{name}" in text
+        assert f"--{name.replace(chr(95), chr(45))}" in text
         assert field.metadata["help"][:30] in text
         assert f"default {field.default}" in text
 

@@ -224,7 +224,7 @@ def test_whatever_the_points_results_are_sound(points):
     values = result.field.values
     assert np.isfinite(values).all()
     assert values.min() >= 0
-    nearest = KDTree(points).query(shapes.node_positions(result.field))[0]
+    nearest = KDTree(result.points).query(shapes.node_positions(result.field))[0]
     assert (values.ravel() - nearest).max() < 0.75 * result.field.spacing
     np.testing.assert_allclose(np.linalg.norm(result.normals, axis=1), 1, atol=1e-9)
     assert np.isfinite(result.confidence).all()

@@ -125,7 +125,7 @@ class TestAlone:
     @pytest.fixture
     def stage(self):
         points = shapes.sphere(400)
-        return fit_local_surface(points, points, local_spacing(points), 3.0), fit_grid(points, 32)
+        return fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0), fit_grid(points, 32)
 
     def test_gives_a_value_at_every_node(self, stage):
         surface, grid = stage

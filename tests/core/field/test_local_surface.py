@@ -18,7 +18,7 @@ SHAPES = {
 
 
 def fit(points, normals, bridge=3.0):
-    return fit_local_surface(points, normals, local_spacing(points), bridge)
+    return fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), bridge)
 
 
 def around(points, random, width=0.6, n=3000):

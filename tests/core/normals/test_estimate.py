@@ -1,0 +1,119 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core import Cancelled, InputError, MissingDependency, Settings, reconstruct
+from core.normals.estimate import checked_constraints, estimate_normals
+from core.normals.pca import pca_normals
+from core.points import local_spacing
+from tests import shapes
+
+NUMPY = Settings(resolution=16, solver="energy", backend="numpy", surface="none")
+POINTS = shapes.torus(500)
+
+
+def degrees(a, b):
+    return np.degrees(np.arccos(np.minimum(np.abs(np.einsum("ni,ni->n", a, b)), 1.0)))
+
+
+@pytest.mark.parametrize("solver", ["reflection", "energy", "pca"])
+def test_every_solver_finds_a_sphere_and_holds_constraints(solver):
+    points = shapes.sphere(400)
+    held, given = np.array([3, 77]), np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0]])
+    settings = Settings(solver=solver, backend="numpy")
+    free, confidence, _ = estimate_normals(points, local_spacing(points), settings)
+    assert degrees(free, points).max() < 8
+    assert degrees(free, points).mean() < 2
+    assert ((confidence >= 0) & (confidence <= 1)).all()
+    normals, *_ = estimate_normals(points, local_spacing(points), settings, (held, given))
+    assert normals[held].tobytes() == given.tobytes()
+
+
+def test_energy_solver_goes_through_the_whole_method():
+    result = reconstruct(POINTS, NUMPY)
+    counts = result.report["counts"]
+    ring = POINTS * [1, 1, 0] / np.linalg.norm(POINTS[:, :2], axis=1, keepdims=True)
+    assert degrees(result.normals, (POINTS - ring) / 0.4).mean() < 4
+    assert counts["backend"] == "numpy"
+    assert counts["energy"][0] > 1.05 * min(counts["energy"]) > 0
+    assert counts["bisector_samples"] > counts["facets"] > 500
+
+
+def test_energy_solver_reports_progress_and_cancels():
+    seen = []
+    reconstruct(POINTS, NUMPY, progress=lambda fraction, text: seen.append((fraction, text)))
+    inside = [fraction for fraction, text in seen if text == "normals"]
+    assert len(inside) > 20
+    assert inside == sorted(inside)
+    with pytest.raises(Cancelled, match="normals"):
+        reconstruct(POINTS, NUMPY, progress=lambda fraction, text: fraction < 0.05)
+
+
+def test_energy_solver_is_deterministic():
+    first, again = (estimate_normals(POINTS, local_spacing(POINTS), NUMPY)[0] for _ in range(2))
+    assert first.tobytes() == again.tobytes()
+
+
+def test_torch_gives_the_normals_of_numpy():
+    pytest.importorskip("torch")
+    spacing = local_spacing(POINTS)
+    by_numpy, _, _ = estimate_normals(POINTS, spacing, NUMPY)
+    by_torch, _, report = estimate_normals(POINTS, spacing, Settings(solver="energy", backend="torch"))
+    auto = estimate_normals(POINTS, spacing, Settings(solver="energy"))[2]
+    assert np.median(degrees(by_numpy, by_torch)) < 0.5
+    assert report["backend"] == auto["backend"] == "torch"
+
+
+def test_missing_torch_is_an_error_when_asked_for_and_numpy_otherwise(monkeypatch):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    spacing = local_spacing(POINTS)
+    with pytest.raises(MissingDependency, match="pip install torch"):
+        estimate_normals(POINTS, spacing, Settings(solver="energy", backend="torch"))
+    assert estimate_normals(POINTS, spacing, Settings(solver="energy"))[2]["backend"] == "numpy"
+
+
+@pytest.mark.parametrize("settings", ["solver='reflection'", "solver='energy', backend='numpy'"])
+def test_torch_is_not_imported_unless_asked_for(settings):
+    script = f"""
+import sys
+from core import Settings, reconstruct
+from tests.shapes import sphere
+reconstruct(sphere(60), Settings(resolution=16, surface="none", {settings}))
+print("torch" in sys.modules)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=Path(__file__).parents[3], check=True
+    )
+    assert done.stdout.strip() == "False"
+
+
+def test_constraints_are_given_by_rows_of_the_input():
+    rows, axes = checked_constraints(([5, 2, 9], [[0, 0, 2], [3, 0, 4], [1, 0, 0]]), np.array([0, 2, 5, 7]))
+    assert rows.tolist() == [2, 1]
+    np.testing.assert_allclose(axes, [[0, 0, 1], [0.6, 0, 0.8]])
+    assert checked_constraints(None, np.arange(3)) is None
+
+
+@pytest.mark.parametrize(
+    ("constraints", "message"),
+    [
+        (3, "not \\(indices, axes\\)"),
+        (([0], [[1, 0]]), "shapes \\(1,\\) and \\(1, 2\\)"),
+        (([0.5], [[1, 0, 0]]), "whole-number"),
+        (([0], [[0, 0, 0]]), "no direction"),
+        (([0], [[np.nan, 0, 0]]), "no direction"),
+    ],
+)
+def test_unusable_constraints_are_refused(constraints, message):
+    with pytest.raises(InputError, match=message):
+        checked_constraints(constraints, np.arange(4))
+
+
+def test_plane_fit_baseline_is_exact_on_a_plane_and_unsure_in_a_volume(random):
+    axes, confidence = pca_normals(shapes.square(200))
+    np.testing.assert_allclose(np.abs(axes[:, 2]), 1.0)
+    np.testing.assert_allclose(confidence, 1.0)
+    assert pca_normals(random.random((200, 3)))[1].mean() < 0.8
