@@ -44,7 +44,8 @@ stderr.
 _OUTPUTS = """\
 files in the folder OUT, named after the scan, each written whole or not at all:
   SCAN.vdb         OpenVDB grids: udf (distance to the surface) and density (fog to look at)
-  SCAN_double.ply  mesh: the closed two-sided cover of the surface (not with --surface none)
+  SCAN_double.ply  mesh: the closed two-sided cover of the surface (with --surface double or both)
+  SCAN_single.ply  mesh: one layer, open where the surface is (with --surface single or both)
   SCAN_points.ply  the samples used, with normals (unit axes, the sign is arbitrary) and confidence
   SCAN.json        settings, counts, seconds, warnings; written last
 All are in the scan's own units and place.
@@ -112,8 +113,16 @@ def _parser():
 def _add_settings(parser, fields):
     """An option for each field of Settings; what it may be is checked by Settings alone."""
     for name, field in fields.items():
-        limits, choices, unit = (field.metadata[key] for key in ("limits", "choices", "unit"))
+        limits, choices, word, unit = (field.metadata[key] for key in ("limits", "choices", "word", "unit"))
+        if field.type is bool:
+            text = f"{field.metadata['help']} (default {field.default})"
+            parser.add_argument(
+                f"--{name}", action=argparse.BooleanOptionalAction, default=field.default, help=text.replace("%", "%%")
+            )
+            continue
         allowed = f"one of {', '.join(choices)}" if choices else f"{limits[0]} to {limits[1]} {unit}".strip()
+        if word:
+            allowed += f", or {word}"
         parser.add_argument(
             f"--{name.replace('_', '-')}",
             metavar=field.type.__name__.upper(),
@@ -178,8 +187,9 @@ def _write(result: Reconstruction, folder, scan, gradient):
         "_points.ply": partial(write_points, **samples),
         ".vdb": partial(write_vdb, field=result.field, gradient=gradient),
     }
-    if result.surface is not None:
-        writers["_double.ply"] = partial(write_mesh, mesh=result.surface)
+    for ending, mesh in (("_double.ply", result.surface), ("_single.ply", result.sheet)):
+        if mesh is not None:
+            writers[ending] = partial(write_mesh, mesh=mesh)
 
     summary = folder / f"{scan.stem}.json"
     report = {**result.report, "scan": scan, "files": [], "warnings": list(result.report["warnings"])}

@@ -5,9 +5,10 @@ from dataclasses import asdict
 
 import numpy as np
 
+from .cleaning.clean import clean
 from .field.distance_field import DistanceField
 from .field.grid import fit_grid
-from .field.integration import integrate
+from .field.integration import distance_field
 from .field.local_surface import fit_local_surface
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
@@ -17,10 +18,11 @@ from .reconstruction import Reconstruction
 from .settings import Settings
 from .surface.double_cover import double_cover
 from .surface.mesh import Mesh
+from .surface.single_layer import single_layer
 
 
 def reconstruct(points, settings: Settings = Settings(), constraints=None, progress=None) -> Reconstruction:
-    """Unsigned distance field, normals and double-covered surface of a point cloud without normals.
+    """Unsigned distance field, normals and surface of a point cloud without normals.
 
     points      : (n,3) array-like of any scale and place; rows that are not finite and exact duplicates are dropped
     constraints : (indices (k,), axes (k,3)), normals to hold fixed at rows of `points`, or None
@@ -43,25 +45,38 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
 
     with stages("points"):
         samples = prepare_samples(points)
+
+    with stages("cleaning"):
+        samples, cleaning = clean(samples, settings, progress.part(0.0, 0.1, "cleaning"))
         constraints = checked_constraints(constraints, samples.source_index)
         spacing = local_spacing(samples.points)
         grid = fit_grid(samples.points, settings.resolution)
 
     with stages("normals"):
         normals, confidence, counts = estimate_normals(
-            samples.points, spacing, settings, constraints, progress.part(0.0, 0.2, "normals")
+            samples.points, spacing, settings, constraints, progress.part(0.1, 0.2, "normals")
         )
 
     with stages("field"):
-        local = fit_local_surface(samples.points, normals, spacing, settings.bridge)
-        values = integrate(local, grid, progress.part(0.2, 0.8, "distance field"))
+        local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge)
+        values, band = distance_field(local, grid, progress.part(0.2, 0.8, "distance field"))
 
-    surface = None
-    if settings.surface == "double":
-        with stages("surface"):
-            surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 1.0, "surface"))
+    surface = sheet = None
+    unoriented = 0
+    with stages("surface"):
+        if settings.surface in ("double", "both"):
+            surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 0.9, "double cover"))
             surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
+        if settings.surface in ("single", "both"):
+            sheet, unoriented = single_layer(band, local, grid, progress.part(0.9, 1.0, "single layer"))
+            sheet = Mesh(samples.to_input_units(sheet.vertices), sheet.faces)
 
+    warnings = list(samples.warnings)
+    if unoriented:
+        warnings.append(
+            f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided there, "
+            "or sheets meet; use the double cover where both sides must show"
+        )
     report = {
         "settings": asdict(settings),
         "counts": {
@@ -71,13 +86,18 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
             "rim_samples": int((local.rims.gap & ~local.rims.bridged).sum()),
             "bridged_samples": int(local.rims.bridged.sum()),
             "nodes": int(np.prod(grid.shape)),
-            **({} if surface is None else {"vertices": len(surface.vertices), "faces": len(surface.faces)}),
+        },
+        "cleaning": cleaning,
+        "meshes": {
+            name: {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": mesh.border_loops()}
+            for name, mesh in (("double", surface), ("single", sheet))
+            if mesh is not None
         },
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
         "spacing": float(np.median(spacing)) * samples.scale,
         "seconds": stages.seconds,
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": list(samples.warnings),
+        "warnings": warnings,
     }
     progress(1.0)
     return Reconstruction(
@@ -89,6 +109,7 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
             values * np.float32(samples.scale), samples.to_input_units(grid.origin), grid.spacing * samples.scale
         ),
         surface=surface,
+        sheet=sheet,
         report=report,
     )
 

@@ -1,6 +1,6 @@
 """Validation of the input and the frame in which everything is computed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -9,6 +9,7 @@ from .errors import InputError
 
 MINIMUM_SAMPLES = 4
 SPACING_NEIGHBOURS = 6
+_SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
 
@@ -33,6 +34,16 @@ class Samples:
 
     def to_input_units(self, x: np.ndarray) -> np.ndarray:
         return np.asarray(x, np.float64) * self.scale + self.centre
+
+    def without(self, dropped: np.ndarray, warning: str) -> "Samples":
+        """The samples not marked in `dropped`, (n,) bool, in a unit frame of their own."""
+        kept = np.flatnonzero(~dropped)
+        return _framed(self.given[kept], self.source_index[kept], (*self.warnings, warning))
+
+    def moved(self, points: np.ndarray) -> "Samples":
+        """The same samples at new places (n,3) of the unit frame; those that did not move stay exactly as given."""
+        stirred = (points != self.points).any(axis=1)[:, None]
+        return replace(self, points=points, given=np.where(stirred, self.to_input_units(points), self.given))
 
 
 def prepare_samples(points) -> Samples:
@@ -65,18 +76,25 @@ def prepare_samples(points) -> Samples:
             f"at least {MINIMUM_SAMPLES} are needed for a surface"
         )
 
-    given = points[source_index]
+    return _framed(points[source_index], source_index, tuple(warnings))
+
+
+def _framed(given, source_index, warnings):
+    """Samples in the unit frame of their own bounding box."""
     low, high = given.min(axis=0), given.max(axis=0)
     with np.errstate(over="ignore"):
         scale = float((high - low).max())
-    if not np.isfinite(scale) or scale < np.finfo(np.float64).tiny / np.finfo(np.float64).eps:
-        raise InputError(f"the points span {scale:g}, which float64 cannot resolve; scale them to an ordinary size")
+    if not _SMALLEST < scale < _LARGEST:
+        raise InputError(
+            f"the points span {scale:g}; distances in single precision need a span from {_SMALLEST:g} to {_LARGEST:g}, "
+            "so scale them to an ordinary size"
+        )
     centre = low + (high - low) / 2
     points = (given - centre) / scale
     thickness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if thickness[1] < _FLATNESS * thickness[0]:
         raise InputError(f"all {len(points)} distinct points lie on one line; a surface needs points off it")
-    return Samples(points, given, source_index, centre, scale, tuple(warnings))
+    return Samples(points, given, source_index, centre, scale, warnings)
 
 
 def local_spacing(points: np.ndarray) -> np.ndarray:

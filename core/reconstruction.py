@@ -17,7 +17,8 @@ class Reconstruction:
     normals      : (n',3) float64 unit axes; the sign carries no meaning
     confidence   : (n',) float64 in [0,1], how well the neighbours agree on the axis
     field        : DistanceField
-    surface      : Mesh, the closed double cover, or None where `surface="none"` was asked
+    surface      : Mesh, the closed double cover, or None where `surface` is "single" or "none"
+    sheet        : Mesh, the single layer, or None where `surface` is "double" or "none"
     report       : dict, JSON-ready: settings, counts, seconds per stage, peak memory, warnings
     """
 
@@ -27,4 +28,5 @@ class Reconstruction:
     confidence: np.ndarray
     field: DistanceField
     surface: Mesh | None
+    sheet: Mesh | None
     report: dict

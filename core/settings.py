@@ -7,11 +7,15 @@ import dataclasses
 import numbers
 from dataclasses import dataclass
 
+import numpy as np
+
 from .errors import SettingsError
 
 
-def _option(default, help, *, limits=None, choices=None, unit=""):
-    return dataclasses.field(default=default, metadata=dict(help=help, limits=limits, choices=choices, unit=unit))
+def _option(default, help, *, limits=None, choices=None, word=None, unit=""):
+    """A field; `word` is the one text that stands for a value found from the data where `limits` ask for a number."""
+    metadata = dict(help=help, limits=limits, choices=choices, word=word, unit=unit)
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -41,18 +45,44 @@ class Settings:
     )
     surface: str = _option(
         "double",
-        "Mesh to extract: the closed two-sided cover of the surface, or none (field and normals only)",
-        choices=("double", "none"),
+        "Mesh to extract: the double cover, closed and two-sided; the single layer, one sheet that is open where the "
+        "surface is open; both; or none (field and normals only)",
+        choices=("double", "single", "both", "none"),
     )
     solver: str = _option(
         "reflection",
-        "How normals are found: by reflections across the Voronoi bisectors, or by a plain local plane fit (PCA), "
-        "which is the baseline to compare with",
-        choices=("reflection", "pca"),
+        "How normals are found: by reflections across the Voronoi bisectors, by minimising the published energy on "
+        "samples of the bisectors (slower, the reference), or by a plain local plane fit (PCA, the baseline)",
+        choices=("reflection", "energy", "pca"),
+    )
+    backend: str = _option(
+        "auto",
+        "What differentiates the energy of that solver: torch, NumPy, or torch where it is installed",
+        choices=("numpy", "torch", "auto"),
+    )
+    outliers: bool = _option(
+        True,
+        "Drop stray points far from any surface before anything else; how many is in the report",
+    )
+    denoise: float = _option(
+        "auto",
+        "How far points are moved onto the smooth surface through their neighbours: not at all (0) to all the way (1). "
+        "With auto all the way where the whole scan is found noisy, else not at all",
+        limits=(0.0, 1.0),
+        word="auto",
+    )
+    memory_limit: float = _option(
+        "auto",
+        "A run that would need more memory than this is refused before it starts. With auto the limit is 70 % of the "
+        "memory that is free",
+        limits=(64.0, 2.0**22),
+        word="auto",
+        unit="MiB",
     )
     seed: int = _option(
         0,
-        "Seed of the tiny jitter that keeps the Voronoi diagram of regular grids fast; same seed, same bytes",
+        "Seed of the tiny jitter that keeps the Voronoi diagram of regular grids fast, and of the samples that noise "
+        "is measured on; same seed, same bytes",
         limits=(0, 2**31 - 1),
     )
 
@@ -72,9 +102,26 @@ def _checked(option, value):
         if value not in metadata["choices"]:
             raise SettingsError(f"{name} is {value!r}; choose one of {', '.join(metadata['choices'])}")
         return value
+    if option.type is bool:
+        if not isinstance(value, (bool, np.bool_)):
+            raise SettingsError(f"{name} is {value!r}; it must be True or False")
+        return bool(value)
+    if metadata["word"]:
+        if isinstance(value, str) and value == metadata["word"]:
+            return value
+        value = _number(value)
     kind = numbers.Integral if option.type is int else numbers.Real
     low, high = metadata["limits"]
     if isinstance(value, bool) or not isinstance(value, kind) or not low <= value <= high:
         what = "a whole number" if option.type is int else "a number"
-        raise SettingsError(f"{name} is {value!r}; it must be {what} from {low} to {high}")
+        word = f", or {metadata['word']!r}" if metadata["word"] else ""
+        raise SettingsError(f"{name} is {value!r}; it must be {what} from {low} to {high}{word}")
     return option.type(value)
+
+
+def _number(value):
+    """The number that a text spells; anything else as it is."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value

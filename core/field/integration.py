@@ -6,6 +6,8 @@ transform finds it), compares it with the feet its neighbours hold, and keeps th
 propagation; P.-E. Danielsson, Computer Graphics and Image Processing 14, 1980).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
@@ -22,8 +24,20 @@ _ROUNDS = 2
 _SLAB = 1 << 18  # nodes
 
 
-def integrate(surface: LocalSurface, grid: Grid, progress=None) -> np.ndarray:
-    """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples."""
+@dataclass(frozen=True)
+class NearBand:
+    """The nodes within BAND cells of the surface.
+
+    node : (b,) int64, flat index in the grid     step : (b,3) float64, from the foot point to the node
+    """
+
+    node: np.ndarray
+    step: np.ndarray
+
+
+def distance_field(surface: LocalSurface, grid: Grid, progress=None) -> tuple[np.ndarray, NearBand]:
+    """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples, and the band
+    in which it is known with its direction."""
     progress = Progress.of(progress)
     node, bound = _near_samples(surface, grid)
     near = surface.project(grid.positions(node), progress.part(0.05, 0.6))
@@ -32,7 +46,7 @@ def integrate(surface: LocalSurface, grid: Grid, progress=None) -> np.ndarray:
     values = _transport(grid, *_settled_feet(surface, grid, node, near, progress.part(0.6, 0.8)), progress.part(0.8, 1.0))
     np.minimum(values, bound, out=values)
     values.flat[node] = near.distance
-    return values
+    return values, NearBand(node, near.step)
 
 
 def _near_samples(surface, grid):

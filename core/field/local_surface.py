@@ -44,6 +44,7 @@ class LocalSurface:
 
     points, normals : (n,3) float64     spacing : (n,) float64, local spacing     bend : (n,3,3) float64
     confidence      : (n,) float64 in [0,1], of the normals
+    bridge          : gaps up to this many local spacings are closed
     """
 
     points: np.ndarray
@@ -51,6 +52,7 @@ class LocalSurface:
     spacing: np.ndarray
     bend: np.ndarray
     confidence: np.ndarray
+    bridge: float
     rims: Rims
     tree: KDTree
 
@@ -142,4 +144,4 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float) -> Lo
     frames = tangent_frames(normals)
     bend = bending(points, normals, frames, spacing, tree)
     rims = find_rims(points, normals, frames, spacing, tree, bridge)
-    return LocalSurface(points, normals, spacing, bend, confidence, rims, tree)
+    return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)

@@ -5,13 +5,22 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, MissingDependency
 from .read_numpy import read_npy, read_npz
-from .read_ply import read_ply
 from .read_text import read_obj, read_text
 
+
+def _read_ply(path):
+    """Imported when needed: Blender has no plyfile, and reads .ply files itself."""
+    try:
+        from .read_ply import read_ply
+    except ModuleNotFoundError as error:
+        raise MissingDependency(f"{path} needs plyfile, which is not installed; `pip install plyfile`") from error
+    return read_ply(path)
+
+
 READERS = {
-    ".ply": read_ply,
+    ".ply": _read_ply,
     ".xyz": read_text,
     ".pts": read_text,
     ".txt": read_text,
@@ -32,7 +41,8 @@ def read_points(path: str | os.PathLike) -> np.ndarray:
     .obj                    : the v lines
 
     Further columns and properties are ignored; rows with NaN or infinite coordinates are kept. Raises
-    :class:`InputError` for anything else, before memory is taken for what the file does not hold.
+    :class:`InputError` for anything else, before memory is taken for what the file does not hold, and
+    :class:`MissingDependency` for .ply without plyfile.
     """
     path = Path(path)
     try:

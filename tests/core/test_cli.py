@@ -42,13 +42,15 @@ def calls(monkeypatch):
         for k in range(5):
             if progress(k / 4, f"stage {k}") is False:
                 raise cli.Cancelled("cancelled during 'stage'; nothing was written")
+        mesh = Mesh(points[:4], np.array([[0, 1, 2]], np.int32))
         return Reconstruction(
             points[:4],
             np.arange(4),
             np.eye(4, 3),
             np.ones(4),
             DistanceField(np.ones((4, 4, 4), np.float32), np.zeros(3), 0.25),
-            Mesh(points[:4], np.array([[0, 1, 2]], np.int32)) if settings.surface != "none" else None,
+            mesh if settings.surface in ("double", "both") else None,
+            mesh if settings.surface in ("single", "both") else None,
             REPORT,
         )
 

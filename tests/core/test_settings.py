@@ -21,7 +21,8 @@ def test_defaults_lie_within_their_limits():
     settings = Settings()
     for name in NUMBERS:
         low, high = options()[name].metadata["limits"]
-        assert low <= getattr(settings, name) <= high
+        value, word = getattr(settings, name), options()[name].metadata["word"]
+        assert value == word if word else low <= value <= high
     for name in CHOICES:
         assert getattr(settings, name) in options()[name].metadata["choices"]
 

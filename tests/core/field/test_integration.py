@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from core import Cancelled, Settings, reconstruct
 from core.field.grid import fit_grid
-from core.field.integration import integrate
+from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from tests import shapes
@@ -129,7 +129,7 @@ class TestAlone:
 
     def test_gives_a_value_at_every_node(self, stage):
         surface, grid = stage
-        values = integrate(surface, grid)
+        values, _ = distance_field(surface, grid)
         assert (values.shape, values.dtype) == (grid.shape, np.float32)
         x = grid.positions(np.arange(values.size))
         assert (values.ravel() <= KDTree(surface.points).query(x)[0] + 0.5 * grid.spacing).all()
@@ -137,15 +137,15 @@ class TestAlone:
 
     def test_near_the_surface_it_is_the_projection_distance(self, stage):
         surface, grid = stage
-        values = integrate(surface, grid)
+        values, _ = distance_field(surface, grid)
         near = np.flatnonzero(values < grid.spacing)
         projected = surface.project(grid.positions(near)).distance
         np.testing.assert_allclose(values.flat[near], projected, atol=1e-6)
 
     def test_reports_in_order_and_stops_when_told(self, stage):
         seen = []
-        integrate(*stage, lambda fraction, _: seen.append(fraction))
+        distance_field(*stage, lambda fraction, _: seen.append(fraction))
         assert seen == sorted(seen)
         assert 0 <= seen[0] <= seen[-1] <= 1
         with pytest.raises(Cancelled):
-            integrate(*stage, lambda fraction, _: fraction < seen[-1])
+            distance_field(*stage, lambda fraction, _: fraction < seen[-1])

@@ -4,7 +4,7 @@ from scipy.spatial import KDTree
 
 from core import Cancelled, Settings, reconstruct
 from core.field.grid import fit_grid
-from core.field.integration import integrate
+from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.double_cover import double_cover
@@ -133,7 +133,7 @@ class TestAlone:
     def stage(self):
         points = shapes.sphere(400)
         surface, grid = fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0), fit_grid(points, 24)
-        return integrate(surface, grid), surface, grid, 1.0
+        return distance_field(surface, grid)[0], surface, grid, 1.0
 
     def test_gives_a_triangle_mesh_in_units_of_the_samples(self, stage):
         mesh = double_cover(*stage)

@@ -1,0 +1,109 @@
+"""How noisy the samples are, and over how many neighbours the surface is best averaged, region by region."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..progress import Progress
+from .quadrics import fit_quadrics
+
+LADDER = (12, 20, 32, 50, 80, 128, 200)  # neighbours tried
+MINIMUM_SAMPLES = 100  # fewer say nothing about noise
+
+_ANCHORS = 5000  # samples at which the fits are compared
+_REGION = 100  # anchors over which errors are averaged
+_SMOOTHING = 25  # anchors over which the chosen neighbourhoods are averaged
+_SEEN = 10.0  # a fit shows the noise in full once its radius is this many times its left-out error
+_USABLE = 6.0  # and averages it, rather than following it, once its radius is this many times the noise
+_GAUSS = 1.4826  # standard deviations in a median absolute error
+_STRAY = 4.5  # errors count as at most this many median ones
+_FREEDOM = 2.0  # a robust fit follows its samples more than its leverage says
+_UNEVEN = 2.0  # a region's noise counts as at most this many times the median: two close sheets look like noise
+
+_EVERYWHERE = 0.04  # local spacings: nine tenths of the regions of a noisy cloud are above it
+_LEVEL = 0.05  # local spacings: half of them are above this
+_GROWTH = 1.15  # from 12 to 20 neighbours noise hardly grows, detail that the samples miss does
+_DROWNED = 0.3  # local spacings: above it 12 neighbours see too little of the noise for that comparison
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise at every sample.
+
+    level      : (n,) float64, standard deviation normal to the surface, units of the samples
+    neighbours : (n,) float64, size of the neighbourhood over which averaging errs least
+    """
+
+    level: np.ndarray
+    neighbours: np.ndarray
+
+
+def is_noisy(points, spacing, seed: int = 0) -> bool:
+    """Whether samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
+
+    Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise is everywhere
+    and looks alike from 12 and from 20 neighbours; creases, close sheets and unresolved detail are in places, or grow.
+    """
+    if len(points) < MINIMUM_SAMPLES:
+        return False
+    anchors, region = _anchors(points, seed)
+    fine, wide = (_GAUSS * np.median(fit_quadrics(points, anchors, k).left_out()[region], axis=1) for k in LADDER[:2])
+    relative = wide / np.median(spacing[anchors][region], axis=1)
+    growth = np.median(wide / np.maximum(fine, np.finfo(float).tiny))
+    everywhere, level = np.percentile(relative, (10, 50))
+    return bool(everywhere > _EVERYWHERE and level > _LEVEL and (growth < _GROWTH or level > _DROWNED))
+
+
+def estimate_noise(points, seed: int = 0, progress=None) -> Noise:
+    """Noise level and best neighbourhood of samples (n,3), n > 12.
+
+    A quadric through the k nearest misses the sample that it leaves out by the noise and by what it cannot bend to.
+    The level is read off the smallest neighbourhood wide enough to see the noise. The risk of that one and of each
+    wider one,
+
+        <h^2> + 2 level^2 <leverage>     (C. Stein, Annals of Statistics 9(6), 1981, up to a constant),
+
+    h being the distance of samples to their quadric, counts the noise left and the detail bent away; every region
+    takes the neighbourhood of least risk.
+    """
+    progress = Progress.of(progress)
+    anchors, region = _anchors(points, seed)
+    ladder = np.array([k for k in LADDER if k < len(points)])
+    radius = KDTree(points).query(points[anchors], k=list(ladder + 1), workers=-1)[0].T
+
+    missed, squared, leverage = np.empty((3, len(ladder), len(anchors)))
+    for i, k in enumerate(ladder):
+        fit = fit_quadrics(points, anchors, int(k), progress.part(i / len(ladder), (i + 1) / len(ladder)))
+        missed[i] = np.sqrt(_regional_square(fit.left_out(), region))
+        squared[i] = _regional_square(fit.height, region)
+        leverage[i] = np.median(fit.leverage[region], axis=1)
+
+    every = np.arange(len(anchors))
+    first = _first(radius >= _SEEN * missed)
+    level = missed[first, every] * np.sqrt(1.0 - leverage[first, every])
+    level = np.minimum(level, _UNEVEN * np.median(level))
+    risk = squared + 2 * _FREEDOM * level**2 * leverage
+    risk[np.arange(len(ladder))[:, None] < _first(radius >= _USABLE * level)] = np.inf
+    neighbours = np.exp(np.log(ladder)[risk.argmin(axis=0)][region[:, :_SMOOTHING]].mean(axis=1))
+
+    nearest = KDTree(points[anchors]).query(points, workers=-1)[1]
+    return Noise(level[nearest], neighbours[nearest])
+
+
+def _anchors(points, seed):
+    """Samples spread over the cloud (m,), and for each the anchors nearest to it (m,k)."""
+    count = min(len(points), _ANCHORS)
+    anchors = np.sort(np.random.default_rng(seed).choice(len(points), count, replace=False))
+    return anchors, KDTree(points[anchors]).query(points[anchors], k=min(_REGION, count), workers=-1)[1]
+
+
+def _first(holds):
+    """First rung at which something holds (rungs, m), or the last rung, (m,)."""
+    return np.where(holds.any(axis=0), holds.argmax(axis=0), len(holds) - 1)
+
+
+def _regional_square(error, region):
+    """Mean square of errors (m,) over each region, strays held back."""
+    error = error[region]
+    return np.mean(np.minimum(error, _STRAY * np.median(error, axis=1, keepdims=True)) ** 2, axis=1)

@@ -1,0 +1,111 @@
+"""Stray samples: scattered through space, hovering beside a surface, or in detached clouds.
+
+A sample is never judged by its density alone, which would eat wires, rims and sparsely scanned parts: it must also
+stand off the plane of its neighbours, or lie among samples that form no surface.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from ..points import SPACING_NEIGHBOURS
+from ..progress import Progress
+from .quadrics import fit_quadrics
+
+MINIMUM_SAMPLES = 100  # fewer leave nothing to compare a sample with
+
+_NEIGHBOURS = 8
+_ROUNDS = 8  # strays hide strays
+_SPARSE = 2.5  # spacing over the median of the cloud: candidates for scattered strays
+_LONELY = 2.0  # spacing over that of the neighbours
+_ALONE = 5.0  # so lonely that the plane no longer matters
+_OFF = 2.0  # distance from the neighbours' plane over their spacing
+_THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a cloud .3
+_CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
+_COMPANY = 40  # sparse samples that vote whether they are strays
+_MAJORITY = 0.6
+_DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
+_SMALL_PART = 0.02  # of all samples
+
+_DIRTY = 0.005  # share of strays from which on those close to the surface are looked for as well
+_FITTED = 20  # neighbours of the quadrics that those are measured against
+_HOVERING = 6.0  # distance from the quadric over the median one around
+_HOVERING_FAR = 0.3  # and over the local spacing
+
+
+def find_outliers(points, progress=None) -> np.ndarray:
+    """(n,) bool: which samples (n,3) are strays.
+
+    - beside a surface: lonelier than its neighbours and off their plane, or far lonelier;
+    - scattered: sparse against the whole cloud, where most sparse samples around form no surface;
+    - detached: in a small part of its own that is a cloud rather than a sheet;
+    - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
+    """
+    progress = Progress.of(progress)
+    stray = np.zeros(len(points), bool)
+    if len(points) < MINIMUM_SAMPLES:
+        return stray
+    for turn in range(_ROUNDS):
+        progress(turn / _ROUNDS)
+        kept = np.flatnonzero(~stray)
+        around = _Surroundings(points[kept])
+        found = around.beside() | around.scattered() | around.detached()
+        if stray.sum() > _DIRTY * len(points):
+            found |= around.hovering()
+        stray[kept[found]] = True
+        if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
+            break
+    return stray
+
+
+class _Surroundings:
+    """What the nearest neighbours of each sample look like."""
+
+    def __init__(self, points):
+        self.points = points
+        distance, self.neighbours = KDTree(points).query(points, k=_NEIGHBOURS + 1, workers=-1)
+        self.spacing = distance[:, 1 : SPACING_NEIGHBOURS + 1].mean(axis=1)
+        group = points[self.neighbours[:, 1:]]
+        centre = group.mean(axis=1)
+        group = group - centre[:, None]
+        squared, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", group, group))
+        extent = np.sqrt(np.maximum(squared, 0.0))
+        size = np.maximum(np.linalg.norm(extent, axis=1), np.finfo(float).tiny)
+        theirs = np.maximum(np.median(self.spacing[self.neighbours[:, 1:]], axis=1), np.finfo(float).tiny)
+        self.thickness = extent[:, 0] / size
+        curve = extent[:, 1] < _CURVE * size
+        self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5)
+        self.lonely = self.spacing / theirs
+        self.off = np.abs(np.einsum("ni,ni->n", points - centre, axes[:, :, 0])) / theirs
+
+    def beside(self):
+        off_plane = (self.lonely > _LONELY) & (self.off > _OFF)
+        return (off_plane | (self.lonely > _ALONE)) & ~self.wire
+
+    def scattered(self):
+        found = np.zeros(len(self.points), bool)
+        sparse = np.flatnonzero(self.spacing > _SPARSE * np.median(self.spacing))
+        if not len(sparse):
+            return found
+        astray = (self.thickness > _THICK) | ((self.off > _OFF) & ~self.wire)
+        k = min(_COMPANY, len(sparse))
+        around = KDTree(self.points[sparse]).query(self.points[sparse], k=k, workers=-1)[1].reshape(len(sparse), k)
+        found[sparse] = astray[sparse[around]].mean(axis=1) > _MAJORITY
+        return found
+
+    def hovering(self):
+        height = fit_quadrics(self.points, np.arange(len(self.points)), _FITTED).left_out()
+        around = np.median(height[self.neighbours], axis=1)
+        return height > np.maximum(_HOVERING * around, _HOVERING_FAR * self.spacing)
+
+    def detached(self):
+        rows = np.repeat(np.arange(len(self.points)), _NEIGHBOURS)
+        columns = self.neighbours[:, 1:].reshape(-1)
+        gap = np.linalg.norm(self.points[rows] - self.points[columns], axis=1)
+        joined = gap < _DETACHED * np.minimum(self.spacing[rows], self.spacing[columns])
+        links = coo_matrix((joined[joined], (rows[joined], columns[joined])), shape=(len(self.points),) * 2)
+        count, part = connected_components(links, directed=False)
+        size = np.bincount(part, minlength=count)
+        thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
+        return (thick & (size < _SMALL_PART * len(self.points)))[part]

@@ -1,0 +1,64 @@
+"""Noisy samples, moved onto the surface that their neighbours share.
+
+The paper alternates between normals and offsets along them (section 4.3) on the Voronoi diagram, which noise breaks
+first. Robust quadrics through the neighbours need no diagram, and their normals come with them.
+"""
+
+import numpy as np
+
+from ..progress import Progress
+from .noise import LADDER, estimate_noise, is_noisy
+from .quadrics import fit_quadrics
+
+LONGEST_MOVE = 4.0  # standard deviations of the noise
+
+_PASSES = 4
+_SHARE = 0.5  # of the best single neighbourhood: several passes average over more than one
+_STEPS_PER_OCTAVE = 2  # of the neighbourhood sizes used
+
+
+def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, progress=None) -> tuple[np.ndarray, dict]:
+    """Samples moved towards quadrics through their neighbours, and what was done, for the report.
+
+    points   : (n,3) float64     spacing : (n,) float64, local spacing, same units
+    strength : "auto" moves all samples of a noisy cloud and none of a clean one; a number in [0,1] moves those of any
+               cloud this share of the way (0 none)
+
+    No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
+    nothing is to do.
+    """
+    if strength == "auto":
+        strength = float(is_noisy(points, spacing, seed))
+    if strength == 0 or len(points) <= LADDER[0]:
+        return points, {}
+    progress = Progress.of(progress)
+    noise = estimate_noise(points, seed, progress.part(0.0, 0.4))
+    neighbours = _rounded(_SHARE * noise.neighbours, len(points))
+    moved = points
+    for turn in range(_PASSES):
+        moved = _onto_quadrics(moved, neighbours, progress.part(0.4 + 0.15 * turn, 0.55 + 0.15 * turn))
+    step = strength * (moved - points)
+    length = np.linalg.norm(step, axis=1)
+    step *= np.minimum(1.0, LONGEST_MOVE * noise.level / np.maximum(length, np.finfo(float).tiny))[:, None]
+    counts = {
+        "noise": float(np.median(noise.level)),
+        "neighbours": [int(k) for k in np.percentile(neighbours, (5, 50, 95), method="nearest")],
+        "mean_move": float(np.linalg.norm(step, axis=1).mean()),
+    }
+    return points + step, counts
+
+
+def _rounded(neighbours, n):
+    """Few distinct sizes, from the ladder's smallest to n - 1."""
+    steps = np.rint(_STEPS_PER_OCTAVE * np.log2(neighbours))
+    return np.clip(np.rint(2 ** (steps / _STEPS_PER_OCTAVE)).astype(int), LADDER[0], n - 1)
+
+
+def _onto_quadrics(points, neighbours, progress):
+    moved = points.copy()
+    sizes = np.unique(neighbours)
+    for i, k in enumerate(sizes):
+        rows = np.flatnonzero(neighbours == k)
+        part = progress.part(i / len(sizes), (i + 1) / len(sizes))
+        moved[rows] += fit_quadrics(points, rows, int(k), part).step
+    return moved

@@ -1,0 +1,123 @@
+"""Which grid edges an unsigned field's surface crosses.
+
+The step from the foot point to a node is the gradient of u^2 / 2, which is smooth across the surface, and whose
+derivative there projects onto the normal (Ambrosio and Mantegazza, J. Geom. Anal. 8, 1998). So in each cell the
+principal axis of that derivative is the normal, its product with the corners' steps says on which side they are, and
+the cells around a grid edge vote whether the surface crosses it.
+
+A surface without border crosses an even number of the edges of every grid face. Where votes disagree, around creases
+mostly, edges are turned over that would leave fewer odd faces; this also takes single notches and spurs off rims.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.grid import Grid
+from ..field.integration import NearBand
+from ..field.local_surface import LocalSurface
+from ..linalg import principal_axes
+
+_COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
+_ROUNDS = 3
+_MAJORITY = 3  # odd faces, of the four around an edge, that turn it over
+
+_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
+_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1])
+_EDGE_AXIS = np.abs(_CORNERS[_EDGES[:, 1]] - _CORNERS[_EDGES[:, 0]]).argmax(axis=1)
+
+
+@dataclass(frozen=True)
+class Crossings:
+    """Grid edges that the surface crosses.
+
+    node  : (e,) int64, flat index of the edge's lower node     axis : (e,) int64, its direction
+    place : (e,3) float64, where, on the surface                cells : (c,) int64, ascending, cells near the surface
+    """
+
+    node: np.ndarray
+    axis: np.ndarray
+    place: np.ndarray
+    cells: np.ndarray
+
+    def cells_around(self, grid: Grid) -> np.ndarray:
+        """The four cells around each edge in cyclic order, by their lowest nodes, (e,4)."""
+        strides = node_strides(grid)
+        first, second = strides[(self.axis + 1) % 3], strides[(self.axis + 2) % 3]
+        return self.node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
+
+
+def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
+    """Crossings of the zero set, from the nodes near it."""
+    cells, side = _sides(band, grid)
+    edge, crossed, place = _vote(cells, side, grid)
+    found = surface.project(place, progress)
+    on = found.distance <= _COVERED * grid.spacing
+    edge, place, crossed = edge[on], place[on] - found.step[on], crossed[on]
+    node, axis = np.divmod(edge, 3)
+    whole = np.isin(Crossings(node, axis, place, cells).cells_around(grid), cells).all(axis=1)
+    node, axis, place, crossed = node[whole], axis[whole], place[whole], crossed[whole]
+    _mend(node, axis, crossed, grid)
+    return Crossings(node[crossed], axis[crossed], place[crossed], cells)
+
+
+def node_strides(grid: Grid) -> np.ndarray:
+    """Steps of the flat node index along the three axes."""
+    return np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
+
+
+def _sides(band, grid):
+    """Cells with all corners in the band, by their lowest node, (c,) ascending, and each corner's signed distance along
+    the cell's normal, (c,8); the sign is the cell's own."""
+    row = np.full(grid.shape, -1, np.int32)
+    row.flat[band.node] = np.arange(len(band.node), dtype=np.int32)
+    inner = np.zeros(grid.shape, bool)
+    inner[:-1, :-1, :-1] = True
+    lowest = band.node[inner.flat[band.node]]
+    corner = row.flat[lowest[:, None] + _CORNERS @ node_strides(grid)]
+    whole = (corner >= 0).all(axis=1)
+    lowest, corner = lowest[whole], corner[whole]
+    step = band.step[corner]
+    slope = np.einsum("cki,kj->cij", step, _CORNERS - 0.5)
+    slope = slope + slope.transpose(0, 2, 1)
+    normal, _ = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    return lowest, np.einsum("cki,ci->ck", step, normal)
+
+
+def _vote(cells, side, grid):
+    """Edges of the cells, as lower node * 3 + axis (e,), whether the vote says crossed, and the likely place (e,3)."""
+    a, b = side[:, _EDGES[:, 0]], side[:, _EDGES[:, 1]]
+    key = 3 * (cells[:, None] + _CORNERS[_EDGES[:, 0]] @ node_strides(grid)) + _EDGE_AXIS
+    opposite = (a >= 0) != (b >= 0)
+    certain = np.minimum(np.abs(a), np.abs(b)) + 1e-9 * grid.spacing
+    share = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
+    edge, index = np.unique(key.reshape(-1), return_inverse=True)
+    index = index.reshape(-1)
+    vote = np.bincount(index, np.where(opposite, certain, -certain).reshape(-1), len(edge))
+    weight = np.bincount(index, certain.reshape(-1), len(edge))
+    share = np.bincount(index, (certain * share).reshape(-1), len(edge)) / weight
+    node, axis = np.divmod(edge, 3)
+    return edge, vote > 0, grid.positions(node) + grid.spacing * share[:, None] * np.eye(3)[axis]
+
+
+def _mend(node, axis, crossed, grid):
+    """Turn over, in place, crossings most of whose faces are odd; edges that share a face never at once."""
+    strides = node_strides(grid)
+    size = int(np.prod(grid.shape))
+    sides = [(axis + 1) % 3, (axis + 2) % 3]
+    faces = np.stack(
+        [across * size + node - back * strides[along] for along, across in (sides, sides[::-1]) for back in (0, 1)],
+        axis=1,
+    )
+    count, index = np.unique(faces, return_inverse=True)
+    faces = index.reshape(-1, 4)
+    odd = np.bincount(faces[crossed].reshape(-1), minlength=len(count)) % 2 == 1
+    position = np.stack(np.unravel_index(node, grid.shape), axis=1) % 2
+    every = np.arange(len(node))
+    colour = 4 * axis + 2 * position[every, sides[0]] + position[every, sides[1]]
+    groups = [np.flatnonzero(colour == c) for c in range(12)]
+    for _ in range(_ROUNDS):
+        for group in groups:
+            turned = group[odd[faces[group]].sum(axis=1) >= _MAJORITY]
+            crossed[turned] ^= True
+            odd[faces[turned].reshape(-1)] ^= True

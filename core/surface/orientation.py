@@ -1,0 +1,43 @@
+"""Consistent winding of a mesh, as far as it can be had."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+from .mesh import Mesh
+
+
+def orient(mesh: Mesh) -> tuple[Mesh, int]:
+    """The mesh wound alike across every edge that has two faces, and the number of such edges where that fails.
+
+    Faces are visited breadth-first within each patch (patches end at borders and at edges with three or more faces),
+    so failures lie along one line of a patch that cannot be oriented, a Moebius band's for instance. A patch is turned
+    so that its area-weighted normals point away from the mesh's centre; a closed one points outwards.
+    """
+    n = len(mesh.faces)
+    tail, head = mesh.faces.reshape(-1), np.roll(mesh.faces, -1, axis=1).reshape(-1)
+    key = np.minimum(tail, head).astype(np.int64) * len(mesh.vertices) + np.maximum(tail, head)
+    order = np.argsort(key, kind="stable")
+    key, owner, forward = key[order], np.repeat(np.arange(n), 3)[order], (tail < head)[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    count = np.diff(first, append=len(key))
+    pair = first[count == 2]
+    a, b, against = owner[pair], owner[pair + 1], forward[pair] == forward[pair + 1]
+
+    graph = coo_matrix((np.where(against, 2, 1), (a, b)), shape=(n, n)).tocsr()
+    graph = graph.maximum(graph.T)
+    patches, patch = connected_components(graph, directed=False)
+    turned = np.zeros(n, bool)
+    for start in np.unique(patch, return_index=True)[1]:
+        visited, parent = breadth_first_order(graph, start, directed=False)
+        relation = np.asarray(graph[visited[1:], parent[visited[1:]]]).reshape(-1) == 2
+        for face, before, flip in zip(visited[1:].tolist(), parent[visited[1:]].tolist(), relation.tolist(), strict=True):
+            turned[face] = turned[before] ^ flip
+
+    corners = mesh.vertices[mesh.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outwards = np.einsum("fi,fi->f", normal, corners.mean(axis=1) - mesh.vertices.mean(axis=0))
+    inwards = np.bincount(patch, np.where(turned, -outwards, outwards), patches) < 0
+    turned ^= inwards[patch]
+    failures = int((against != (turned[a] ^ turned[b])).sum())
+    return Mesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces)), failures
