@@ -1,0 +1,135 @@
+"""Arguments of `python -m benchmarks`."""
+
+import argparse
+import json
+import platform
+import sys
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+
+from core import InputError, Settings, SettingsError, VADError
+from core.io.atomic import atomic_path, writable_folder
+from core.io.report import write_report
+from core.settings import options
+
+from .cases import find_cases, has_sampling
+from .peers import check_open3d
+from .report import comparison, markdown_tables, read_run, terminal_header, terminal_row
+from .results import write_results
+from .run import run_cases
+
+DONE, CASE_FAILED, BAD_INPUT, CANCELLED = 0, 1, 2, 130
+_LIBRARIES = ("numpy", "scipy", "libigl")
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise SettingsError(f"{message}; see {self.prog} --help")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run on `arguments` (default: those of the process) and return the exit status."""
+    try:
+        return _benchmark(_parser().parse_args(arguments))
+    except VADError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("error: cancelled", file=sys.stderr)
+        return CANCELLED
+
+
+def _parser():
+    parser = _Parser(
+        prog="python -m benchmarks",
+        description="Reconstruct every case of a folder; measure field, normals, surface and cost against the truth.",
+        epilog="exit status: 0 done, 1 a case failed, 2 bad input (one line says what), 130 cancelled",
+        allow_abbrev=False,
+    )
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="holds the cases, .npz files")
+    parser.add_argument("--cases", metavar="A,B", type=lambda text: text.split(","), help="only these (default: all)")
+    parser.add_argument("--blue-noise", action="store_true", help="the blue-noise samples instead of the uniform ones")
+    parser.add_argument("--resolution", metavar="CELLS", type=int, help="short for --set resolution=CELLS")
+    parser.add_argument(
+        "--set", metavar="NAME=VALUE", type=_assignment, nargs="+", default=[], help=f"settings: {', '.join(options())}"
+    )
+    parser.add_argument("--peer", action="store_true", help="also run the references (needs open3d)")
+    parser.add_argument("--save", metavar="NAME", type=Path, help="write NAME.json and NAME.md")
+    parser.add_argument("--compare", metavar="JSON", type=Path, help="say what changed since a saved run")
+    parser.add_argument(
+        "--results", action="store_true", help="run everything, both samplings, with the peers; write docs/results.md"
+    )
+    return parser
+
+
+def _assignment(text):
+    name, equals, value = text.partition("=")
+    if not equals or name not in options():
+        raise argparse.ArgumentTypeError(f"{text!r} sets nothing; write NAME=VALUE, NAME one of {', '.join(options())}")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value
+
+
+def _benchmark(given):
+    chosen = dict(given.set) | ({} if given.resolution is None else {"resolution": given.resolution})
+    settings = Settings(**chosen)
+    if given.peer or given.results:
+        check_open3d()
+    if given.results:
+        if chosen or given.cases or given.blue_noise or given.save or given.compare:
+            raise SettingsError("--results covers all cases at the default settings; drop the other options")
+        runs = {sampling: _run(given, sampling, settings, True) for sampling in ("uniform", "blue noise")}
+        print(f"wrote {write_results(runs)}")
+        return _status(*runs.values())
+
+    earlier = read_run(given.compare) if given.compare else None
+    if given.save:
+        writable_folder(given.save.parent)
+    run = _run(given, "blue noise" if given.blue_noise else "uniform", settings, given.peer)
+    if given.save:
+        _save(run, given.save)
+    if earlier:
+        print("\n".join(comparison(earlier, run)))
+    return _status(run)
+
+
+def _run(given, sampling, settings, with_peers):
+    """Run the cases that have the sampling, printing as they finish."""
+    found = find_cases(given.folder, given.cases)
+    paths = [path for path in found if has_sampling(path, sampling)]
+    if not paths:
+        raise InputError(f"no case has {sampling} samples; choose the other sampling or other cases")
+    for path in found:
+        if path not in paths:
+            print(f"{path.stem} has no {sampling} samples and is left out")
+    print(terminal_header())
+    cases = []
+    for result in run_cases(paths, sampling, settings, with_peers):
+        print(terminal_row(result), flush=True)
+        cases.append(result)
+    libraries = {name: version(name) for name in (*_LIBRARIES, *(["open3d"] if with_peers else []))}
+    return {
+        "sampling": sampling,
+        "settings": asdict(settings),
+        "versions": {"python": platform.python_version(), **libraries},
+        "cases": cases,
+    }
+
+
+def _save(run, stem):
+    path = stem.with_name(f"{stem.name}.json")
+    write_report(path, run)
+    with atomic_path(stem.with_name(f"{stem.name}.md")) as temporary:
+        temporary.write_text(f"# {stem.name}: {run['sampling']} samples\n\n{markdown_tables(run['cases'])}", "utf-8")
+    print(f"wrote {path} and {stem.name}.md")
+
+
+def _status(*runs):
+    return CASE_FAILED if any("error" in result for run in runs for result in run["cases"]) else DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""Exact distances to meshes and random points on them."""
+
+import igl
+import numpy as np
+
+from core import Mesh
+
+
+def closest_points(x: np.ndarray, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (m,) from points `x` (m,3) to the nearest triangle, and the nearest point (m,3) on it."""
+    squared, _, foot = igl.point_mesh_squared_distance(x, mesh.vertices, mesh.faces.astype(np.int64))
+    return np.sqrt(squared), foot
+
+
+def surface_points(mesh: Mesh, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Points (count,3) on the mesh, uniform by area."""
+    areas = mesh.face_areas()
+    a, b, c = mesh.vertices[mesh.faces[rng.choice(len(areas), count, p=areas / areas.sum())]].transpose(1, 0, 2)
+    root, along = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
+    return a + root * ((1 - along) * (b - a) + along * (c - a))
+
+
+def border_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points on the open edges, uniform by length, with the directions that lead off the surface there.
+
+    Returns points, outward (unit, in the plane of the edge's face, square to the edge) and up (unit, square to that
+    face), all (count,3); empty arrays where the mesh has no open edge.
+    """
+    faces = mesh.faces[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3)
+    _, edge, uses = np.unique(np.sort(faces[:, :2], axis=1), axis=0, return_inverse=True, return_counts=True)
+    start, end, inner = mesh.vertices[faces[uses[edge.reshape(-1)] == 1]].transpose(1, 0, 2)
+    if not len(start):
+        return (np.empty((0, 3)),) * 3
+    length = np.linalg.norm(end - start, axis=1)
+    chosen = rng.choice(len(length), count, p=length / length.sum())
+    along = ((end - start) / length[:, None])[chosen]
+    outward = (start - inner)[chosen]
+    outward -= np.einsum("mi,mi->m", outward, along)[:, None] * along
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    return start[chosen] + (rng.random(count) * length[chosen])[:, None] * along, outward, np.cross(outward, along)

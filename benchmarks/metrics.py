@@ -1,0 +1,93 @@
+"""How far a surface and its normals are from the truth, and whether the mesh is sound."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from core import Mesh
+
+from .geometry import closest_points, surface_points
+
+SAMPLES = 200_000
+NEAR_CURVE = 0.05
+_ZERO_AREA = 1e-6  # of the mean face area
+
+
+def surface_errors(mesh: Mesh, truth: Mesh, seed: int = 0) -> dict:
+    """Distances between two surfaces, x1e3, from SAMPLES area-uniform points on each to the triangles of the other.
+
+    to_truth_mean, to_truth_max : from the mesh to the truth (what is too much)
+    to_mesh_mean, to_mesh_max   : from the truth to the mesh (what is missing)
+    cd : mean of the two means     hd : the larger maximum
+    f005, f010 : harmonic mean of the two shares of points closer than .005 and .010 (not x1e3)
+    """
+    rng = np.random.default_rng(seed)
+    to_truth, _ = closest_points(surface_points(mesh, SAMPLES, rng), truth)
+    to_mesh, _ = closest_points(surface_points(truth, SAMPLES, rng), mesh)
+    return {
+        "cd": 1e3 * (to_truth.mean() + to_mesh.mean()) / 2,
+        "hd": 1e3 * max(to_truth.max(), to_mesh.max()),
+        "to_truth_mean": 1e3 * to_truth.mean(),
+        "to_truth_max": 1e3 * to_truth.max(),
+        "to_mesh_mean": 1e3 * to_mesh.mean(),
+        "to_mesh_max": 1e3 * to_mesh.max(),
+        "f005": _harmonic_mean((to_truth < 0.005).mean(), (to_mesh < 0.005).mean()),
+        "f010": _harmonic_mean((to_truth < 0.010).mean(), (to_mesh < 0.010).mean()),
+    }
+
+
+def _harmonic_mean(a, b):
+    return 2 * a * b / (a + b) if a + b else 0.0
+
+
+def topology(mesh: Mesh) -> dict:
+    """Counts that tell whether a mesh is closed and in how many pieces.
+
+    components and euler (vertices - edges + faces) count vertices in use only; border_edges have one face,
+    nonmanifold_edges three or more.
+    """
+    edges, faces_at = mesh.edge_counts()
+    n = len(mesh.vertices)
+    used = len(np.unique(mesh.faces))
+    graph = coo_matrix((np.ones(len(edges)), edges.T), shape=(n, n))
+    return {
+        "components": connected_components(graph, directed=False)[0] - (n - used),
+        "euler": used - len(edges) + len(mesh.faces),
+        "border_edges": int((faces_at == 1).sum()),
+        "nonmanifold_edges": int((faces_at > 2).sum()),
+    }
+
+
+def cover_euler(truth: Mesh, nm_curve: np.ndarray) -> int | None:
+    """Euler characteristic of a perfect double cover: twice that of the true surface, whatever its borders and
+    junctions. None where sheets cross without an edge there, so that the true mesh does not show how they connect."""
+    found = topology(truth)
+    crosses_unmarked = len(nm_curve) > 0 and not found["nonmanifold_edges"]
+    return None if crosses_unmarked else 2 * found["euler"]
+
+
+def triangle_quality(mesh: Mesh) -> dict:
+    """Mean of the triangles' smallest angles, degrees, and the share of triangles without area."""
+    corners = mesh.vertices[mesh.faces]
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    sine = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    angles = np.degrees(np.arctan2(sine, np.einsum("fki,fki->fk", ahead, behind)))
+    areas = mesh.face_areas()
+    return {"min_angle": angles.min(axis=1).mean(), "zero_area": (areas <= _ZERO_AREA * areas.mean()).mean()}
+
+
+def normal_agreement(axes: np.ndarray, true_normals: np.ndarray, points: np.ndarray, nm_curve: np.ndarray) -> dict:
+    """|n . n*| at the samples, all arrays (n,3) unit except `nm_curve` (m,3).
+
+    nc : mean     nc_p05 : 5th percentile     nc_curve : mean within NEAR_CURVE of `nm_curve`, None where nobody is
+    """
+    agreement = np.abs(np.einsum("ni,ni->n", axes, true_normals))
+    near = np.zeros(len(points), bool)
+    if len(nm_curve):
+        near = KDTree(nm_curve).query(points)[0] < NEAR_CURVE
+    return {
+        "nc": agreement.mean(),
+        "nc_p05": np.percentile(agreement, 5),
+        "nc_curve": agreement[near].mean() if near.any() else None,
+    }

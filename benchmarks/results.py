@@ -1,0 +1,88 @@
+"""docs/results.md: what is measured, how, and what came out, for both samplings."""
+
+from pathlib import Path
+
+from core.io.atomic import atomic_path, writable_folder
+from core.io.report import write_report
+
+from .report import markdown_tables
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+_INTRODUCTION = """\
+# Results
+
+Made by `python -m benchmarks FOLDER --results`, which writes this page and the numbers behind it
+([uniform](results/uniform.json), [blue noise](results/blue_noise.json)); do not edit it by hand.
+
+Every case is a point cloud without normals sampled from a known mesh, whose longest side is 0.8. Settings are the
+defaults, the same for every case; nothing is chosen per shape:
+{settings}.
+**Lengths are in the scale of the case and times 1000**, unless they are in cells of the grid (a cell is about 0.008).
+The machine has 2 shared CPU cores and no GPU, so times are given only as ratios to a peer that ran on the same points
+right after. Other work on the machine still shows: by the clock such ratios have differed up to fivefold between runs,
+in CPU time mostly by less than a third, so only the latter are worth comparing.
+
+{cases}
+
+## How it is measured
+
+- **Surface**: 200 000 area-uniform, seeded points on either mesh, exact distance to the triangles of the other
+  (libigl). *to truth* (what is too much) and *to mesh* (what is missing): mean / maximum. *CD* is the mean of the two
+  means, *HD* the larger maximum, *F@t* the harmonic mean of the shares closer than t (in the scale of the case).
+- **Mesh**: the double cover is to be closed, so every edge should have two faces. Its Euler number should be twice that
+  of the true surface, borders and junctions included; no expectation is given where sheets cross and the true mesh
+  has no edge there. Sheets closer than about two cells cannot be told apart, so those cases miss it for that reason
+  too (petals_10k: neighbouring petals come within 0.3 cell). *least angle*: mean of the triangles' smallest angles;
+  *no area*: share of faces below a millionth of the mean area.
+- **Normals**: |n·n\\*| at the input points: mean, 5th percentile, and mean within 0.05 of curves where sheets
+  meet or cross.
+- **Field**, on 20 000 seeded points each: mean |u − d| over the *box* and within 0.05 of the surface (*near*), d the
+  exact distance to the true mesh. *eikonal*: mean | ‖∇u‖ − 1 | over those points of the box where the exact distance,
+  differenced over the nodes that the gradient depends on (1.5 cells either way), has a slope within 0.02 of 1; that
+  leaves out the surface itself and the medial axis, where no field has slope 1. *angle*: median angle between ∇u and
+  the direction from the closest true point, from 1.5 cells to 0.05 away. *u on surface*: mean u there, in cells; the
+  trilinear reading of exact nodes alone gives 0.33. *above*: share of nodes where u exceeds the distance to the
+  nearest sample, and by how many cells at most; it never should. *u/d 4, 8, 16*: u over the exact distance at so many
+  cells past an open rim: mean (5th to 95th percentile), 1 is perfect, below 1 means that the sheet leaks past its end.
+- **Cost**: share of the time of each stage; peak memory of the process (each case has its own, Python and libraries
+  included); time over that of *Poisson*: Open3D's PCA normals (30 neighbours), orientation along tangent planes (15)
+  and Poisson reconstruction at depth 8, by the clock and in CPU time, which feels other work on the machine less; and
+  the time of the normals over that of `scipy.spatial.Delaunay` alone (best of three), the least that any Voronoi method
+  must spend.
+- **Against the peer**: errors of that same Poisson run. It closes open surfaces by design, has no field of distances
+  and needs an orientation, which non-orientable and non-manifold shapes do not have: read it as what the common route
+  gives on the same points.
+
+A dash means that there is nothing to measure.
+"""
+
+
+def write_results(runs: dict[str, dict]) -> Path:
+    """Write the page and one JSON file for each run, by sampling. Returns the page."""
+    folder, page = writable_folder(DOCS / "results"), DOCS / "results.md"
+    first = next(iter(runs.values()))
+    settings = ", ".join(f"{name} {value}" for name, value in first["settings"].items())
+    text = _INTRODUCTION.format(settings=settings, cases=_case_table(runs))
+    for sampling, run in runs.items():
+        write_report(folder / f"{sampling.replace(' ', '_')}.json", run)
+        text += f"\n## Samples: {sampling}\n\n{markdown_tables(run['cases'], level=3)}"
+    with atomic_path(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return page
+
+
+def _case_table(runs):
+    """Kind, number of points in each sampling and licence of every case."""
+    by_name = [{result["case"]: result for result in run["cases"] if "error" not in result} for run in runs.values()]
+    names = dict.fromkeys(name for results in by_name for name in results)
+    lines = [
+        f"| case | kind | {' | '.join(f'points, {s}' for s in runs)} | surface |",
+        f"|---|---|{'---:|' * len(runs)}---|",
+    ]
+    for name in names:
+        found = [results.get(name) for results in by_name]
+        known = next(result for result in found if result)
+        counts = " | ".join(str(result["points"]) if result else "–" for result in found)
+        lines.append(f"| {name} | {known['category']} | {counts} | {known['licence']} |")
+    return "\n".join(lines)
