@@ -6,10 +6,10 @@ READY := $(VENV)/.ready
 SUITS := import ensurepip, sys, venv; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 13)])
 PYTHON ?= $(shell for p in python3.13 python3.11 python3; do $$p -c '$(SUITS)' 2>/dev/null && echo $$p && break; done)
 
-.PHONY: help demo test lint format zip bench clean
+.PHONY: help demo test gui-test lint format zip bench clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
 	@echo "PYTHON=... picks the interpreter (3.11 or 3.13) that makes $(VENV)."
 
 demo: $(READY) ## reconstruct the bundled scan into demo/, with a picture
@@ -17,6 +17,9 @@ demo: $(READY) ## reconstruct the bundled scan into demo/, with a picture
 
 test: $(READY) ## run every test that needs no window; ARGS="-k word" picks some
 	$(RUN) -m pytest $(ARGS)
+
+gui-test: $(READY) ## run the tests in a Blender with a window; BLENDER=/path/to/blender picks it
+	$(RUN) scripts/gui_tests.py $(if $(BLENDER),--blender "$(BLENDER)") $(ARGS)
 
 lint: $(READY) ## check style and likely mistakes
 	$(RUN) -m ruff check

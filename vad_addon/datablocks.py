@@ -6,33 +6,39 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.surface.mesh import Mesh
 from . import volume_files
+from .attributes import Attribute, write
 
 
-def mesh_data(name: str, mesh: Mesh, origin) -> bpy.types.Mesh:
-    """A triangle mesh, shaded smooth as all new ones are, with vertices relative to `origin`, (3,) float64."""
+def mesh_data(name: str, vertices, faces, origin, attributes: dict[str, Attribute]) -> bpy.types.Mesh:
+    """A triangle mesh, shaded smooth as all new ones are: (v,3) `vertices` relative to `origin`, (f,3) `faces`."""
     data = bpy.data.meshes.new(name)
-    count = len(mesh.faces)
-    data.vertices.add(len(mesh.vertices))
-    data.vertices.foreach_set("co", _float32(mesh.vertices - origin))
+    count = len(faces)
+    data.vertices.add(len(vertices))
+    data.vertices.foreach_set("co", _float32(vertices - origin))
     data.loops.add(3 * count)
-    data.loops.foreach_set("vertex_index", np.ascontiguousarray(mesh.faces, np.int32).ravel())
+    data.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).ravel())
     data.polygons.add(count)
     data.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
     data.update(calc_edges=True)
+    write(data, attributes)
     return data
 
 
-def pointcloud_data(name: str, points, origin, attributes: dict[str, np.ndarray]) -> bpy.types.PointCloud:
-    """A point cloud at `points` (n,3) relative to `origin`, with (n,) and (n,3) `attributes` in single precision."""
+def vertices_data(name: str, points, origin) -> bpy.types.Mesh:
+    """A mesh of loose vertices at `points` (n,3) relative to `origin`."""
+    data = bpy.data.meshes.new(name)
+    data.vertices.add(len(points))
+    data.vertices.foreach_set("co", _float32(points - origin))
+    return data
+
+
+def pointcloud_data(name: str, points, origin, attributes: dict[str, Attribute]) -> bpy.types.PointCloud:
+    """A point cloud at `points` (n,3) relative to `origin`."""
     cloud = _empty_cloud(len(points))
     cloud.name = name
     cloud.attributes["position"].data.foreach_set("vector", _float32(points - origin))
-    for key, values in attributes.items():
-        kind, slot = ("FLOAT", "value") if values.ndim == 1 else ("FLOAT_VECTOR", "vector")
-        attribute = cloud.attributes.get(key) or cloud.attributes.new(key, kind, "POINT")
-        attribute.data.foreach_set(slot, _float32(values))
+    write(cloud, attributes)
     return cloud
 
 
@@ -43,6 +49,25 @@ def volume_data(name: str, path: Path, active: str) -> bpy.types.Volume:
     volume.grids.load()
     volume.grids.active_index = volume.grids.find(active)
     return volume
+
+
+def replace_data(old: bpy.types.ID, new: bpy.types.ID) -> None:
+    """Put `new` wherever `old` is used, under its name and with its materials, and remove `old`."""
+    for material in old.materials:
+        new.materials.append(material)
+    old.user_remap(new)
+    name = old.name
+    bpy.data.batch_remove([old])
+    new.name = name
+
+
+def replace_volume(old: bpy.types.Volume, new: bpy.types.Volume) -> None:
+    """Let `old` read the file of `new`, keep all else as the user left it, and remove `new`."""
+    grid = old.grids[old.grids.active_index].name if len(old.grids) else ""
+    old.filepath = new.filepath
+    old.grids.load()
+    old.grids.active_index = max(old.grids.find(grid), 0)
+    bpy.data.batch_remove([new])
 
 
 def _float32(values):

@@ -1,95 +1,116 @@
-"""From a reconstruction to objects in the scene."""
+"""From the outcome of a run to objects in the scene."""
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ..core.errors import VADError
-from ..core.io.report import report_json
-from ..core.reconstruction import Reconstruction
-from . import datablocks, volume_files
+from . import datablocks, materials, results, volume_files
+from .attributes import Attribute
+from .outcome import Outcome
+from .points_in import Source
+
+_OWN = {"normal", "confidence", "distance", "radius"}  # attributes that results set themselves
 
 
-@dataclass
-class Delivery:
-    """What a run left in the scene; `surface` and `volume` are None where there is no such result."""
+def deliver(scene: bpy.types.Scene, source: Source, outcome: Outcome, keep_both: bool = False) -> bpy.types.Collection:
+    """Put the outcome into a collection "`name` VAD" of `scene`: surface, samples and volume, all or nothing.
 
-    collection: bpy.types.Collection
-    samples: bpy.types.Object
-    warnings: list[str]
-    surface: bpy.types.Object | None = None
-    volume: bpy.types.Object | None = None
-
-
-def deliver(scene: bpy.types.Scene, name: str, result: Reconstruction) -> Delivery:
-    """Link a collection "`name` VAD" with the surface, the samples and the volume to `scene`, all or nothing.
-
+    Where this source has results from an earlier run, these are updated, and the objects keep the materials and the
+    modifiers that the user gave them; `keep_both` makes a second collection instead.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
     for large coordinates. A volume that cannot be written becomes a warning: the other results are delivered.
-    The collection carries the run's report as JSON in its custom property ``vad_report``, see also :func:`summary`
-    and :func:`warnings`.
+    The collection carries the run's report as JSON in its custom property ``vad_report``; see also :mod:`results`.
     """
-    origin = _origin(result.points)
+    origin = next((obj for obj in bpy.data.objects if obj.session_uid == source.uid), None)
+    warnings = list(outcome.warnings)
+    collection = None if keep_both else results.previous(scene, origin)
+    if collection is not None and any(obj.mode != "OBJECT" for obj in collection.objects):
+        warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
+        collection = None
     with ExitStack() as rollback:
+        made = _data(source, outcome, warnings, rollback)
+        if collection is None:
+            collection = bpy.data.collections.new(f"{source.name} VAD")
+            scene.collection.children.link(collection)
+        rollback.pop_all()
+    for role in (results.SAMPLES, results.SURFACE, results.FIELD):
+        _place(collection, role, made.get(role), outcome.origin)
+    if results.FIELD in made:
+        materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell)
+    if origin is not None:
+        collection[results.SOURCE] = origin
+    collection[results.REPORT] = outcome.report
+    collection[results.SUMMARY] = "\n".join(_summary(outcome))
+    collection[results.WARNINGS] = "\n".join(warnings)
+    scene.vad.result = collection
+    return collection
 
-        def keep(block):
-            rollback.callback(bpy.data.batch_remove, [block])
-            return block
 
-        def add(suffix, make, *arguments):
-            data = keep(make(f"{name} {suffix}", *arguments))
-            obj = keep(bpy.data.objects.new(data.name, data))
-            obj.location = origin
-            collection.objects.link(obj)
-            return obj
+def _data(source, outcome, warnings, rollback):
+    """New data-blocks by role; `rollback` removes them and the volume's file."""
 
-        collection = keep(bpy.data.collections.new(f"{name} VAD"))
-        attributes = dict(
-            normal=result.normals,
-            confidence=result.confidence,
-            radius=np.full(len(result.points), 0.25 * result.field.spacing),
+    def keep(data):
+        rollback.callback(bpy.data.batch_remove, [data])
+        return data
+
+    carried = {name: attribute for name, attribute in source.attributes.items() if name not in _OWN}
+    carried = {name: attribute[outcome.source_index] for name, attribute in carried.items()}
+    own = dict(
+        normal=Attribute.of(outcome.normals),
+        confidence=Attribute.of(outcome.confidence),
+        radius=Attribute.of(np.full(len(outcome.points), 0.25 * outcome.cell)),
+    )
+    name, origin = source.name, outcome.origin
+    made = {
+        results.SAMPLES: keep(
+            datablocks.pointcloud_data(f"{name} samples", outcome.points, origin, carried | own),
         )
-        samples = add("samples", datablocks.pointcloud_data, result.points, origin, attributes)
-        delivery = Delivery(collection, samples, list(result.report["warnings"]))
-        if result.surface is not None:
-            delivery.surface = add("surface", datablocks.mesh_data, result.surface, origin)
+    }
+    if (skin := outcome.surface) is not None:
+        on_skin = {key: attribute[skin.nearest] for key, attribute in carried.items()}
+        on_skin |= dict(distance=Attribute.of(skin.distance), confidence=own["confidence"][skin.nearest])
+        made[results.SURFACE] = keep(
+            datablocks.mesh_data(f"{name} surface", skin.vertices, skin.faces, origin, on_skin)
+        )
+    if outcome.volume is not None:
         try:
-            path = volume_files.write(name, replace(result.field, origin=result.field.origin - origin))
+            path = volume_files.adopt(name, outcome.volume)
         except VADError as error:
-            delivery.warnings.append(f"No volume: {error}")
+            warnings.append(f"No volume: {error}")
         else:
             rollback.callback(path.unlink)
-            delivery.volume = add("field", datablocks.volume_data, path, "density")
-            delivery.volume.data.display.density = 0.5 / result.field.spacing
-        collection["vad_report"] = report_json(result.report)
-        collection["vad_summary"] = "\n".join(_summary(result))
-        collection["vad_warnings"] = "\n".join(delivery.warnings)
-        scene.collection.children.link(collection)
-        scene.vad.result = collection
-        rollback.pop_all()
-    return delivery
+            made[results.FIELD] = keep(datablocks.volume_data(f"{name} field", path, "density"))
+    return made
 
 
-def summary(collection: bpy.types.Collection) -> list[str]:
-    """A few lines on the run that made `collection`, for people."""
-    return collection.get("vad_summary", "").splitlines()
+def _place(collection, role, data, origin):
+    """Give the collection's object of this role new data, make it where it is missing, or remove it for lack of data.
+
+    An object that the user moved stays so unless the samples have another centre now.
+    """
+    obj = results.member(collection, role)
+    if data is None:
+        if obj is not None:
+            bpy.data.batch_remove([obj])
+        return
+    if obj is None:
+        obj = bpy.data.objects.new(data.name, data)
+        obj[results.ROLE] = role
+        collection.objects.link(obj)
+    elif role == results.FIELD:
+        datablocks.replace_volume(obj.data, data)
+    else:
+        datablocks.replace_data(obj.data, data)
+    if tuple(obj.get("vad_origin", ())) != tuple(origin):
+        obj["vad_origin"] = origin
+        obj.location = origin
 
 
-def warnings(collection: bpy.types.Collection) -> list[str]:
-    """What went less than well in the run that made `collection`, one line each."""
-    return collection.get("vad_warnings", "").splitlines()
-
-
-def _summary(result):
-    yield f"{len(result.points):,} samples"
-    yield " × ".join(map(str, result.field.values.shape)) + " grid"
-    if result.surface is not None:
-        yield f"{len(result.surface.faces):,} triangles"
-    yield f"{sum(result.report['seconds'].values()):.1f} s"
-
-
-def _origin(points):
-    """Centre of the bounding box, (3,), rounded to what an object's location can hold exactly."""
-    return (0.5 * (points.min(axis=0) + points.max(axis=0))).astype(np.float32).astype(np.float64)
+def _summary(outcome):
+    yield f"{len(outcome.points):,} samples"
+    yield " × ".join(map(str, outcome.shape)) + " grid"
+    if outcome.surface is not None:
+        yield f"{len(outcome.surface.faces):,} triangles"
+    yield f"{outcome.seconds:.1f} s"

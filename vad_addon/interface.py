@@ -2,24 +2,44 @@
 
 import bpy
 
-from . import operators, panel, properties
+from . import extras, importer, operators, overlay, panel, preferences, presets, properties
 
 CLASSES = (
+    overlay.VAD_PG_overlay,
     properties.VAD_PG_scene,
     operators.VAD_OT_reconstruct,
-    panel.VAD_PT_reconstruct,
-    panel.VAD_PT_more_settings,
-    panel.VAD_PT_last_run,
+    operators.VAD_OT_cancel,
+    *extras.CLASSES,
+    preferences.VAD_OT_clear_cache,
+    preferences.VAD_preferences,
+    presets.VAD_OT_add_preset,
+    presets.VAD_PT_presets,
+    importer.VAD_OT_import_points,
+    importer.VAD_FH_points,
+    *panel.CLASSES,
 )
+_NEW_DATA = bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
 
 
 def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.vad = bpy.props.PointerProperty(type=properties.VAD_PG_scene)
+    bpy.types.TOPBAR_MT_file_import.append(importer.draw_menu)
+    presets.register()
+    bpy.app.handlers.load_post.append(preferences.prepare_scenes)
+    for handlers in _NEW_DATA:
+        handlers.append(overlay.on_new_data)
 
 
 def unregister():
+    operators.stop_run()
+    overlay.remove()
+    for handlers in _NEW_DATA:
+        handlers.remove(overlay.on_new_data)
+    bpy.app.handlers.load_post.remove(preferences.prepare_scenes)
+    presets.unregister()
+    bpy.types.TOPBAR_MT_file_import.remove(importer.draw_menu)
     del bpy.types.Scene.vad
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

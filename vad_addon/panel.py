@@ -3,10 +3,11 @@
 import bpy
 
 from ..core.settings import options
-from .delivery import summary, warnings
+from . import extras, job, results, shapes, status
 from .message import draw_message
-from .operators import VAD_OT_reconstruct
-from .points_in import point_count, selection_problem
+from .operators import VAD_OT_cancel, VAD_OT_reconstruct
+from .points_in import point_count, selection_problem, sources
+from .presets import VAD_PT_presets
 
 MAIN_SETTINGS = ("resolution", "bridge", "offset")
 
@@ -20,14 +21,24 @@ class _Sidebar:
 class VAD_PT_reconstruct(_Sidebar, bpy.types.Panel):
     bl_label = "VAD Surface Reconstruction"
 
+    def draw_header_preset(self, context):
+        VAD_PT_presets.draw_panel_header(self.layout)
+
     def draw(self, context):
-        layout = self.layout
-        obj = context.active_object
-        if problem := selection_problem(obj):
+        layout, stored = self.layout, context.scene.vad
+        if running := job.running():
+            _draw_progress(layout, running)
+            return
+        objects = sources(context)
+        if problem := selection_problem(context):
             draw_message(layout, problem, "INFO")
         else:
-            layout.label(text=f"{obj.name}: {point_count(obj, context):,} points", icon=f"OUTLINER_OB_{obj.type}")
-        _settings_column(layout, context.scene.vad, MAIN_SETTINGS)
+            name = objects[0].name if len(objects) == 1 else f"{len(objects)} objects"
+            icon = f"OUTLINER_OB_{objects[0].type}"
+            layout.label(text=f"{name}: {point_count(objects, context):,} points", icon=icon)
+        extra = ["selected_only"] if any(obj.mode == "EDIT" for obj in objects) else []
+        again = results.previous(context.scene, objects[0]) if objects else None
+        _settings_column(layout, stored, [*extra, *MAIN_SETTINGS, *(["keep_both"] if again else [])])
         layout.operator(VAD_OT_reconstruct.bl_idname, icon="OUTLINER_OB_MESH")
 
 
@@ -52,10 +63,74 @@ class VAD_PT_last_run(_Sidebar, bpy.types.Panel):
         result = context.scene.vad.result
         lines = self.layout.column(align=True)
         lines.label(text=result.name, icon="OUTLINER_COLLECTION")
-        for line in summary(result):
+        for line in results.summary(result):
             lines.label(text=line, icon="BLANK1")
-        for warning in warnings(result):
+        for warning in results.warnings(result):
             draw_message(self.layout, warning, "ERROR")
+
+
+class VAD_PT_look(_Sidebar, bpy.types.Panel):
+    bl_label = "Look Closer"
+    bl_parent_id = "VAD_PT_reconstruct"
+
+    @classmethod
+    def poll(cls, context):
+        return extras.chosen_result(context) is not None
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        column.operator(extras.VAD_OT_shell.bl_idname, icon="MOD_SOLIDIFY")
+        column.operator(extras.VAD_OT_slice.bl_idname, icon="MOD_BOOLEAN")
+        column.operator(extras.VAD_OT_normals_to_geometry.bl_idname, icon="CURVES_DATA")
+        obj = context.active_object
+        for modifier in obj.modifiers if obj else ():
+            if modifier.type == "VOLUME_TO_MESH" and results.role(obj) == shapes.SHELL:
+                self.layout.prop(modifier, "threshold", text="Distance")
+
+
+class VAD_PT_overlay(_Sidebar, bpy.types.Panel):
+    bl_label = "Show Normals"
+    bl_parent_id = "VAD_PT_reconstruct"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.vad.overlay, "show", text="")
+
+    def draw(self, context):
+        style = context.scene.vad.overlay
+        names = ["colour_by", *(["colour"] if style.colour_by == "SINGLE" else [])]
+        _settings_column(self.layout, style, [*names, "fixed_colour", "length", "width", "every", "maximum"])
+
+
+class VAD_PT_axes(_Sidebar, bpy.types.Panel):
+    bl_label = "Fix Normals by Hand"
+    bl_parent_id = "VAD_PT_reconstruct"
+
+    @classmethod
+    def poll(cls, context):
+        return context.mode == "EDIT_MESH"
+
+    def draw(self, context):
+        column = self.layout.column(align=True)
+        for item in extras.VAD_OT_fix_axes.bl_rna.properties["origin"].enum_items:
+            column.operator(extras.VAD_OT_fix_axes.bl_idname, text=f"From {item.name}").origin = item.identifier
+        self.layout.operator(extras.VAD_OT_free_axes.bl_idname)
+
+
+CLASSES = (
+    VAD_PT_reconstruct,
+    VAD_PT_more_settings,
+    VAD_PT_last_run,
+    VAD_PT_look,
+    VAD_PT_overlay,
+    VAD_PT_axes,
+)
+
+
+def _draw_progress(layout, running):
+    layout.progress(factor=running.fraction, text=f"{running.fraction:.0%}")
+    layout.label(text=status.line(running), icon="TIME")
+    layout.operator(VAD_OT_cancel.bl_idname, icon="CANCEL")
 
 
 def _settings_column(layout, scene_settings, names):

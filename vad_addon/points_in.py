@@ -1,43 +1,85 @@
 """From Blender's objects to plain points."""
 
+from dataclasses import dataclass
+
 import bmesh
 import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from . import attributes, results
+from .attributes import Attribute
 
 READABLE = {"MESH", "POINTCLOUD", "CURVES", "CURVE"}
+AXIS = "vad_axis"  # attribute that holds the normal's axis where the user fixed it, in the object's space, else zeros
 
 
-def selection_problem(obj: bpy.types.Object | None) -> str:
-    """Why `obj` cannot be reconstructed, one line; empty where it can."""
+@dataclass(frozen=True)
+class Source:
+    """Points copied out of Blender, which may do with the objects what it likes from then on.
+
+    name        : of the first object
+    uid         : `session_uid` of the first object
+    points      : (n,3) float64, world space
+    attributes  : what the points carry, colours for instance
+    constraints : (indices (k,), axes (k,3) in world space), or None
+    """
+
+    name: str
+    uid: int
+    points: np.ndarray
+    attributes: dict[str, Attribute]
+    constraints: tuple[np.ndarray, np.ndarray] | None
+
+
+def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The objects to reconstruct: the active one first, then the others selected. Where these are results of earlier
+    runs only, what the active one was made from, so that a run can be repeated with its results at hand."""
+    active = context.active_object
+    chosen = ([active] if active else []) + [obj for obj in context.selected_objects if obj != active]
+    if scans := [obj for obj in chosen if obj.type in READABLE and results.role(obj) is None]:
+        return scans
+    origins = [results.origin(obj, context.scene) or obj for obj in chosen[:1]]
+    return [obj for obj in origins if obj.type in READABLE]
+
+
+def selection_problem(context: bpy.types.Context) -> str:
+    """Why nothing can be reconstructed, one line; empty where something can."""
+    if sources(context):
+        return ""
+    obj = context.active_object
     if obj is None:
         return "No active object: select a point cloud or a mesh"
-    if obj.type not in READABLE:
-        kind = obj.type.replace("_", " ").lower()
-        return f"{obj.name} ({kind}) holds no points: select a point cloud or a mesh"
-    return ""
+    kind = obj.type.replace("_", " ").lower()
+    return f"{obj.name} ({kind}) holds no points: select a point cloud or a mesh"
 
 
-def world_points(obj: bpy.types.Object, context: bpy.types.Context) -> np.ndarray:
-    """Every point of the object as the viewport shows it, (n,3) float64, world space.
+def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected_only: bool = False) -> Source:
+    """Every point of the objects as the viewport shows them.
 
-    These are the vertices of its mesh, the points of its point cloud, the control points of its curves and the origins
-    of its instances, after modifiers and geometry nodes. Raises :class:`InputError` where there are none.
+    These are the vertices of meshes, the points of point clouds, the control points of curves and the origins of
+    instances, after modifiers and geometry nodes. With `selected_only`, of objects in edit mode only what is selected
+    there. Raises :class:`InputError` where there are none.
     """
-    if obj.mode == "EDIT":
-        obj.update_from_editmode()
-    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-    local = np.concatenate([np.empty((0, 3)), *_local_points(evaluated)])
-    if not len(local):
-        raise InputError(f"{obj.name} has 0 points: select an object with vertices or points")
-    matrix = np.array(evaluated.matrix_world, np.float64)
-    return local @ matrix[:3, :3].T + matrix[:3, 3]
+    clouds = [_world_cloud(obj, context, selected_only) for obj in objects]
+    points = np.concatenate([cloud[0] for cloud in clouds])
+    name = objects[0].name if len(objects) == 1 else f"{objects[0].name} and {len(objects) - 1} more"
+    if not len(points):
+        what = "selected points" if selected_only and objects[0].mode == "EDIT" else "points"
+        raise InputError(f"{name} has 0 {what}: select an object with vertices or points")
+    joined = attributes.join([(len(points), carried) for points, carried in clouds])
+    axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
+    fixed = np.flatnonzero(axes.any(axis=1))
+    return Source(objects[0].name, objects[0].session_uid, points, joined, (fixed, axes[fixed]) if len(fixed) else None)
 
 
-def point_count(obj: bpy.types.Object, context: bpy.types.Context) -> int:
-    """Length of :func:`world_points` without copying any, cheap enough for every redraw. In mesh edit mode it leaves
+def point_count(objects: list[bpy.types.Object], context: bpy.types.Context) -> int:
+    """Length of :func:`gather`'s points without copying any, cheap enough for every redraw. In mesh edit mode it leaves
     out what modifiers add."""
+    return sum(_point_count(obj, context) for obj in objects)
+
+
+def _point_count(obj, context):
     if obj.mode == "EDIT" and obj.type == "MESH":
         return len(bmesh.from_edit_mesh(obj.data).verts)
     geometry = obj.evaluated_get(context.evaluated_depsgraph_get()).evaluated_geometry()
@@ -46,26 +88,60 @@ def point_count(obj: bpy.types.Object, context: bpy.types.Context) -> int:
     return mesh + sum(cloud.attributes.domain_size("POINT") for cloud in clouds if cloud)
 
 
-def _local_points(evaluated):
-    """(n,3) float32 coordinates of each component of the evaluated object, in its own space."""
+def _world_cloud(obj, context, selected_only):
+    """(n,3) float64 points in world space and what they carry."""
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
+    parts = list(_components(evaluated, selected_only and obj.mode == "EDIT"))
+    local = np.concatenate([np.empty((0, 3)), *(points for points, _ in parts)])
+    carried = attributes.join([(len(points), found) for points, found in parts])
+    matrix = np.array(evaluated.matrix_world, np.float64)
+    if AXIS in carried:
+        carried[AXIS] = Attribute("FLOAT_VECTOR", carried[AXIS].values @ np.linalg.pinv(matrix[:3, :3]))
+    return local @ matrix[:3, :3].T + matrix[:3, 3], carried
+
+
+def _components(evaluated, selected_only):
+    """(n,3) float32 points of each component of the evaluated object, in its own space, and what they carry."""
     geometry = evaluated.evaluated_geometry()  # owns the components below: must outlive them
     if evaluated.type == "MESH":  # in edit mode the geometry set holds an empty wrapper, to_mesh() the real vertices
-        yield _vectors(evaluated.to_mesh().vertices, "co", 3)
+        mesh = evaluated.to_mesh()
+        flags = _values(mesh.vertices, "select", bool) if selected_only else None
+        yield _picked(_values(mesh.vertices, "co", np.float32, 3), mesh, flags)
         evaluated.to_mesh_clear()
     elif geometry.mesh:
-        yield _vectors(geometry.mesh.vertices, "co", 3)
+        yield _values(geometry.mesh.vertices, "co", np.float32, 3), attributes.read(geometry.mesh)
     for cloud in filter(_has_points, (geometry.pointcloud, geometry.curves)):
-        yield _vectors(cloud.attributes["position"].data, "vector", 3)
+        flags = _cloud_selection(cloud) if selected_only else None
+        yield _picked(_values(cloud.attributes["position"].data, "vector", np.float32, 3), cloud, flags)
     instances = geometry.instances_pointcloud()
     if _has_points(instances):  # their "position" is uninitialised memory in Blender 4.5 and 5.0
-        yield _vectors(instances.attributes["instance_transform"].data, "value", 16)[:, 12:15]
+        yield _values(instances.attributes["instance_transform"].data, "value", np.float32, 16)[:, 12:15], {}
+
+
+def _picked(points, data, flags):
+    """The points, all or those flagged, and what they carry."""
+    carried = attributes.read(data)
+    if flags is None:
+        return points, carried
+    rows = np.flatnonzero(flags)
+    return points[rows], {name: attribute[rows] for name, attribute in carried.items()}
+
+
+def _cloud_selection(cloud):
+    """(n,) flags of a point cloud or curves; None where the attribute is missing, which means all."""
+    selection = cloud.attributes.get(".selection")
+    if selection is None or selection.domain != "POINT":
+        return None
+    return _values(selection.data, "value", bool if selection.data_type == "BOOLEAN" else np.float32)
 
 
 def _has_points(cloud):
     return cloud is not None and cloud.attributes.domain_size("POINT") > 0
 
 
-def _vectors(items, name, width):
-    vectors = np.empty((len(items), width), np.float32)
-    items.foreach_get(name, vectors.ravel())
-    return vectors
+def _values(items, name, dtype, *width):
+    values = np.empty((len(items), *width), dtype)
+    items.foreach_get(name, values.ravel())
+    return values

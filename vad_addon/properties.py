@@ -3,6 +3,20 @@
 import bpy
 
 from ..core.settings import Settings, options
+from .overlay import VAD_PG_overlay
+
+RUN_OPTIONS = {
+    "selected_only": bpy.props.BoolProperty(
+        name="Selected Points Only",
+        description="Of objects in edit mode, use only the points selected there",
+        options={"SKIP_SAVE"},
+    ),
+    "keep_both": bpy.props.BoolProperty(
+        name="Keep Earlier Results",
+        description="Put the results beside those of an earlier run on the same object, rather than in their place",
+        options={"SKIP_SAVE"},
+    ),
+}
 
 
 def settings_properties(**keywords) -> dict:
@@ -10,17 +24,26 @@ def settings_properties(**keywords) -> dict:
 
     Meant as a class's ``__annotations__``.
     """
-    return {name: _property(option, **keywords) for name, option in options().items()}
+    return {name: setting_property(option, **keywords) for name, option in options().items()}
 
 
 def settings_from(stored, override) -> Settings:
     """Settings held by `stored` (a :class:`VAD_PG_scene`), except those that were set explicitly in `override`
     (an operator's ``properties``). Raises :class:`SettingsError`."""
-    chosen = {name: override if override.is_property_set(name) else stored for name in options()}
-    return Settings(**{name: _exact(getattr(source, name)) for name, source in chosen.items()})
+    return Settings(**{name: _exact(value) for name, value in _merged(options(), stored, override).items()})
 
 
-def _property(option, **keywords):
+def chosen(stored, override) -> dict[str, bool]:
+    """The options of a run that are no settings of the method, by the same rule."""
+    return _merged(RUN_OPTIONS, stored, override)
+
+
+def _merged(names, stored, override):
+    return {name: getattr(override if override.is_property_set(name) else stored, name) for name in names}
+
+
+def setting_property(option, **keywords):
+    """The deferred bpy property that shows this field of Settings."""
     metadata = option.metadata
     unit = f". Unit: {metadata['unit']}" if metadata["unit"] else ""
     keywords |= dict(
@@ -29,6 +52,11 @@ def _property(option, **keywords):
     if metadata["choices"]:
         items = [(choice, choice.title(), "") for choice in metadata["choices"]]
         return bpy.props.EnumProperty(items=items, **keywords)
+    if metadata["word"]:  # a number or the word: Settings takes numbers as text, too
+        words = [metadata["word"]]
+        return bpy.props.StringProperty(search=lambda self, context, text: words, **keywords)
+    if option.type is bool:
+        return bpy.props.BoolProperty(**keywords)
     low, high = metadata["limits"]
     kind = {int: bpy.props.IntProperty, float: bpy.props.FloatProperty}[option.type]
     return kind(min=low, max=high, **keywords)
@@ -39,11 +67,15 @@ def _exact(value):
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-class VAD_PG_scene(bpy.types.PropertyGroup):
-    """What the sidebar keeps with each scene: the settings and the collection of the last run."""
+_STATE = {
+    "result": bpy.props.PointerProperty(
+        type=bpy.types.Collection, name="Last Result", description="Collection made by the last run"
+    ),
+    "overlay": bpy.props.PointerProperty(type=VAD_PG_overlay),
+}
 
-    __annotations__ = settings_properties() | {
-        "result": bpy.props.PointerProperty(
-            type=bpy.types.Collection, name="Last Result", description="Collection made by the last run"
-        )
-    }
+
+class VAD_PG_scene(bpy.types.PropertyGroup):
+    """What the sidebar keeps with each scene: the settings, the collection of the last run, the look of the normals."""
+
+    __annotations__ = settings_properties() | RUN_OPTIONS | _STATE

@@ -33,9 +33,9 @@ def read(blender, extension):
     points_in = extension("vad_addon.points_in")
 
     def read(obj):
-        points = points_in.world_points(obj, blender.context)
+        points = points_in.gather([obj], blender.context).points
         assert points.dtype == np.float64
-        assert points_in.point_count(obj, blender.context) == len(points)
+        assert points_in.point_count([obj], blender.context) == len(points)
         return points
 
     return read
@@ -97,7 +97,7 @@ def test_modifiers_count_in_edit_mode(blender, extension, add_mesh, sphere):
     blender.ops.object.mode_set(mode="EDIT")
     blender.context.evaluated_depsgraph_get()
     bmesh.from_edit_mesh(obj.data).verts.new((7, 8, 9))
-    assert len(extension("vad_addon.points_in").world_points(obj, blender.context)) == 2 * 501
+    assert len(extension("vad_addon.points_in").gather([obj], blender.context).points) == 2 * 501
 
 
 def test_hair_curves(read, blender, add):
@@ -128,3 +128,96 @@ def test_points_made_by_geometry_nodes(read, blender, add_mesh, sphere, instance
 def test_an_object_without_points_is_refused(read, add_mesh, extension):
     with pytest.raises(extension("core.errors").InputError, match="Scan has 0 points"):
         read(add_mesh("Scan", np.empty((0, 3))))
+
+
+@pytest.fixture
+def gather(blender, extension):
+    """Function: gather from what is selected."""
+    points_in = extension("vad_addon.points_in")
+
+    def gather(**options):
+        return points_in.gather(points_in.sources(blender.context), blender.context, **options)
+
+    return gather
+
+
+def test_selected_objects_are_joined_the_active_one_first(blender, gather, add_mesh, sphere):
+    other, active = add_mesh("Other", sphere[:100]), add_mesh("Scan", sphere)
+    other.location = 5, 0, 0
+    found = gather()
+    assert (found.name, found.uid) == ("Scan", active.session_uid)
+    assert_allclose(found.points, np.concatenate([sphere, sphere[:100] + np.array([5, 0, 0])]), atol=1e-6)
+    other.select_set(False)
+    assert len(gather().points) == 500
+
+
+def test_a_selected_camera_does_not_matter(blender, gather, add, add_mesh, sphere):
+    scan = add_mesh("Scan", sphere)
+    add("Eye", blender.data.cameras.new("Eye"))
+    assert gather().uid == scan.session_uid
+
+
+def test_a_result_stands_for_what_it_was_made_from(blender, gather, add_mesh, sphere):
+    scan, result = add_mesh("Scan", sphere), add_mesh("Result", sphere)
+    result["vad_role"] = "surface"
+    assert gather().uid == scan.session_uid
+    scan.select_set(False)
+    assert gather().uid == result.session_uid  # of a source unknown, or gone
+
+    made = blender.data.collections.new("Scan VAD")
+    made.objects.link(result)
+    made["vad_source"] = scan
+    assert gather().uid == scan.session_uid
+    blender.data.objects.remove(scan)
+    assert gather().uid == result.session_uid
+
+
+@pytest.mark.parametrize("modifier", [False, True])
+def test_only_what_is_selected_in_edit_mode(blender, gather, add_mesh, sphere, modifier):
+    import bmesh
+
+    obj = add_mesh("Scan", sphere)
+    if modifier:
+        obj.modifiers.new("Move", "DISPLACE").strength = 0
+    blender.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(obj.data)
+    for vertex in edited.verts:
+        vertex.select = vertex.index % 5 == 0
+    assert_allclose(gather(selected_only=True).points, sphere[::5], atol=1e-7)
+    assert len(gather().points) == 500
+    blender.ops.object.mode_set(mode="OBJECT")
+    assert len(gather(selected_only=True).points) == 500
+
+
+def test_an_empty_selection_is_refused(blender, gather, add_mesh, sphere, extension):
+    add_mesh("Scan", sphere)
+    blender.ops.object.mode_set(mode="EDIT")
+    blender.ops.mesh.select_all(action="DESELECT")
+    with pytest.raises(extension("core.errors").InputError, match="Scan has 0 selected points"):
+        gather(selected_only=True)
+
+
+def test_attributes_of_joined_objects_line_up(gather, add_mesh, sphere):
+    for name, count in (("Plain", 3), ("Scan", 4)):
+        obj = add_mesh(name, sphere[:count])
+        if name == "Scan":
+            obj.data.attributes.new("Col", "FLOAT_COLOR", "POINT").data.foreach_set("color", np.arange(16.0) / 16)
+            obj.data.attributes.new("label", "INT", "POINT").data.foreach_set("value", [4, 3, 2, 1])
+    carried = gather().attributes
+    assert set(carried) == {"Col", "label"}
+    assert_allclose(carried["Col"].values, np.vstack([np.arange(16.0).reshape(4, 4) / 16, np.zeros((3, 4))]))
+    assert carried["label"].values.tolist() == [4, 3, 2, 1, 0, 0, 0]
+
+
+def test_fixed_axes_follow_the_object_as_normals_do(gather, add_mesh, sphere):
+    obj = add_mesh("Scan", sphere)
+    axes = np.zeros((500, 3))
+    axes[7], axes[20] = (1, 1, 0), (0, 0, 2)
+    obj.data.attributes.new("vad_axis", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", axes.ravel())
+    obj.scale = 1, 4, 1
+    found = gather()
+    indices, world_axes = found.constraints
+    assert "vad_axis" not in found.attributes
+    assert indices.tolist() == [7, 20]
+    unit = world_axes / np.linalg.norm(world_axes, axis=1, keepdims=True)
+    assert_allclose(unit, [np.array([4, 1, 0]) / 17**0.5, (0, 0, 1)], atol=1e-6)

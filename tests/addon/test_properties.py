@@ -22,14 +22,14 @@ def test_defaults_limits_and_help_are_those_of_settings(blender, options):
         assert metadata["unit"] in shown.description
         if metadata["choices"]:
             assert tuple(item.identifier for item in shown.enum_items) == metadata["choices"]
-        else:
+        elif metadata["limits"] and not metadata["word"]:
             assert (shown.hard_min, shown.hard_max) == pytest.approx(metadata["limits"], rel=1e-6)
 
 
 def test_the_operator_has_no_other_arguments_and_forgets_them(blender, options):
     properties = blender.ops.vad.reconstruct.get_rna_type().properties
-    assert {prop.identifier for prop in properties} == {*options, "rna_type"}
-    assert all(properties[name].is_skip_save for name in options)
+    assert {prop.identifier for prop in properties} == {*options, "selected_only", "keep_both", "rna_type"}
+    assert all(prop.is_skip_save for prop in properties if prop.identifier != "rna_type")
 
 
 def test_settings_come_from_the_scene_unless_the_operator_says_otherwise(blender, extension):
@@ -54,8 +54,25 @@ def test_every_limit_survives_single_precision(blender, extension, options, end)
         def is_property_set(self, name):
             return False
 
-    numeric = {name: option.metadata["limits"][end] for name, option in options.items() if option.metadata["limits"]}
+    limits = {name: option.metadata["limits"] for name, option in options.items() if not option.metadata["word"]}
+    numeric = {name: pair[end] for name, pair in limits.items() if pair}
     for name, limit in numeric.items():
         setattr(stored, name, limit)
     settings = extension("vad_addon.properties").settings_from(stored, Nothing())
     assert {name: getattr(settings, name) for name in numeric} == numeric
+
+
+def test_a_number_or_a_word_is_typed_as_text(blender, extension, options):
+    stored = blender.context.scene.vad
+    settings_from = extension("vad_addon.properties").settings_from
+
+    class Nothing:
+        def is_property_set(self, name):
+            return False
+
+    assert settings_from(stored, Nothing()).denoise == "auto"
+    stored.denoise = "0.25"
+    assert settings_from(stored, Nothing()).denoise == 0.25
+    stored.denoise = "much"
+    with pytest.raises(extension("core.errors").SettingsError, match="denoise is 'much'"):
+        settings_from(stored, Nothing())

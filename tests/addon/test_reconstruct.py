@@ -122,7 +122,7 @@ def test_the_volume_shows_the_grid_asked_for(folder, run, scan, extension, grid)
 def test_no_run_overwrites_the_file_of_another(folder, run, scan):
     first = run()["field"].data
     before = (folder / "vad" / "Scan.vdb").read_bytes()
-    second = run(resolution=16)["field"].data
+    second = run(resolution=16, keep_both=True)["field"].data
     assert second.filepath == "//vad/Scan_001.vdb"
     assert (folder / "vad" / "Scan.vdb").read_bytes() == before
     assert grids_of(first) == grids_of(second) == {"udf", "density"}
@@ -156,18 +156,29 @@ def test_the_source_stays_as_it_is_and_active(blender, folder, run, scan, sphere
 def test_the_last_run_is_summarised_and_its_report_kept(blender, folder, run, scan, extension):
     run()
     result = blender.context.scene.vad.result
-    lines = extension("vad_addon.delivery").summary(result)
+    lines = extension("vad_addon.results").summary(result)
     assert lines[0] == "500 samples"
     assert f"{len(blender.data.meshes['Scan surface'].polygons):,} triangles" in lines
     assert float(lines[-1].removesuffix(" s")) >= 0
     assert json.loads(result["vad_report"])["settings"]["resolution"] == 32
 
 
-def test_a_point_cloud_works_as_the_source(blender, folder, run, scan):
-    samples = run()["samples"]
-    blender.context.view_layer.objects.active = samples
-    again = {obj.name: obj for obj in run() and blender.context.scene.vad.result.objects}
-    assert len(again["Scan samples samples"].data.attributes["position"].data) == 500
+def test_a_point_cloud_works_as_the_source(blender, folder, run, scan, add):
+    cloud = run()["samples"].data.copy()
+    scan.select_set(False)
+    add("Cloud", cloud)
+    assert {"samples", "surface", "field"} == set(run())
+    (again,) = (obj for obj in blender.context.scene.vad.result.objects if obj.type == "POINTCLOUD")
+    assert again.name == "Cloud samples"
+    assert len(again.data.attributes["position"].data) == 500
+
+
+def test_a_run_is_repeated_from_its_results(blender, folder, run, scan):
+    made = run()
+    scan.hide_set(True)
+    scan.select_set(False)
+    blender.context.view_layer.objects.active = made["surface"]
+    assert run(resolution=24) == made
 
 
 def test_one_undo_takes_everything_away(blender, folder, scan):
@@ -227,7 +238,7 @@ def test_without_openvdb_the_other_results_are_delivered(blender, folder, run, s
     def fail(*arguments, **keywords):
         raise missing
 
-    monkeypatch.setattr(extension("vad_addon.volume_files"), "write_vdb", fail)
+    monkeypatch.setattr(extension("vad_addon.outcome"), "write_vdb", fail)
     assert set(run()) == {"samples", "surface"}
     assert "Warning: No volume: OpenVDB is missing" in capfd.readouterr().out
     assert not list(folder.rglob("*.vdb"))
@@ -236,6 +247,6 @@ def test_without_openvdb_the_other_results_are_delivered(blender, folder, run, s
 def test_a_folder_that_cannot_be_written_costs_only_the_volume(blender, folder, run, scan, extension, capfd):
     (folder / "vad").write_text("a file where the folder should be")
     assert set(run()) == {"samples", "surface"}
-    (warning,) = extension("vad_addon.delivery").warnings(blender.context.scene.vad.result)
+    (warning,) = extension("vad_addon.results").warnings(blender.context.scene.vad.result)
     assert warning.startswith(f"No volume: nothing can be written into {folder / 'vad'}")
     assert f"Warning: {warning}" in capfd.readouterr().out

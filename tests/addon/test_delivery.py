@@ -1,0 +1,191 @@
+"""What a second run does to the results of the first, and what the results carry."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+
+@pytest.fixture
+def scan(blender, add_mesh, sphere):
+    """A sphere whose points carry their own coordinates as a colour, and a number."""
+    obj = add_mesh("Scan", sphere)
+    colours = np.column_stack([0.5 + 0.5 * sphere, np.ones(500)])
+    obj.data.attributes.new("Col", "FLOAT_COLOR", "POINT").data.foreach_set("color", colours.ravel())
+    obj.data.attributes.new("label", "INT", "POINT").data.foreach_set("value", np.arange(500))
+    return obj
+
+
+@pytest.fixture
+def folder(blender, tmp_path):
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    return tmp_path
+
+
+@pytest.fixture
+def run(blender, folder, extension):
+    """Function: run, return the objects of the result by role."""
+
+    def run(**settings):
+        assert blender.ops.vad.reconstruct(**{"resolution": 24, **settings}) == {"FINISHED"}
+        return {obj["vad_role"]: obj for obj in blender.context.scene.vad.result.objects}
+
+    return run
+
+
+def values(data, name, slot="value", width=1):
+    attribute = data.attributes[name]
+    flat = np.empty(width * len(attribute.data), np.float32)
+    attribute.data.foreach_get(slot, flat)
+    return flat.reshape(-1, width) if width > 1 else flat
+
+
+def positions(mesh):
+    return values(mesh, "position", "vector", 3)
+
+
+def test_samples_and_surface_carry_what_the_source_carried(run, scan, sphere):
+    made = run()
+    assert_allclose(values(made["samples"].data, "Col", "color", 4)[:, :3], 0.5 + 0.5 * sphere, atol=1e-6)
+    assert values(made["samples"].data, "label").tolist() == list(range(500))
+    surface = made["surface"].data
+    label = values(surface, "label").astype(int)
+    world = positions(surface) + np.array(made["surface"].location)
+    away = np.linalg.norm(world[:, None] - sphere[None], axis=2)
+    assert_allclose(away[np.arange(len(label)), label], away.min(axis=1), atol=1e-5)
+    assert_allclose(values(surface, "Col", "color", 4)[:, :3], 0.5 + 0.5 * sphere[label], atol=1e-6)
+
+
+def test_the_surface_knows_distance_and_confidence(run, scan):
+    made = run()
+    surface, samples = made["surface"].data, made["samples"].data
+    confidence = values(samples, "confidence")[values(surface, "label").astype(int)]
+    assert_allclose(values(surface, "confidence"), confidence)
+    assert 0 <= values(surface, "distance").min() <= values(surface, "distance").max() < 2 / 24
+
+
+def test_a_second_run_updates_in_place(blender, run, scan):
+    first = run()
+    before = set(blender.data.objects), set(blender.data.collections), set(blender.data.meshes)
+    coarse = len(first["surface"].data.vertices)
+    second = run(resolution=32)
+    assert second == first
+    assert (set(blender.data.objects), set(blender.data.collections)) == before[:2]
+    assert {mesh.name for mesh in blender.data.meshes} == {"Scan", "Scan surface"}
+    assert len(second["surface"].data.vertices) > 1.3 * coarse
+    assert second["field"].data.filepath == "//vad/Scan_001.vdb"
+    assert len(blender.data.materials) == len(blender.data.volumes) == len(blender.data.pointclouds) == 1
+
+
+def test_materials_modifiers_and_places_survive(blender, run, scan):
+    made = run()
+    for obj in made.values():
+        obj.data.materials.append(blender.data.materials.new(f"My {obj.name}"))
+    made["surface"].modifiers.new("Mine", "SMOOTH")
+    made["surface"].location.x += 3
+    made["field"].data.display.density *= 2
+    duplicate = blender.data.objects.new("Linked duplicate", made["surface"].data)
+    display = made["field"].data.display.density
+    made = run(resolution=48)
+    for obj in made.values():
+        assert obj.data.materials[-1].name == f"My {obj.name}"
+    assert "Mine" in made["surface"].modifiers
+    assert made["surface"].location.x == pytest.approx(3, abs=1e-3)
+    assert made["field"].data.display.density == pytest.approx(2 * display, rel=0.05)  # half the cell, twice as dense
+    assert duplicate.data == made["surface"].data
+
+
+def test_results_follow_a_source_that_moved(run, scan):
+    run()
+    scan.location = 0, 0, 10
+    assert {tuple(np.round(obj.location, 2)) for obj in run().values()} == {(0, 0, 10)}
+
+
+def test_both_are_kept_where_asked(blender, run, scan):
+    first = run()
+    second = run(keep_both=True)
+    assert not set(first.values()) & set(second.values())
+    third = run()
+    assert third == second
+
+
+def test_another_source_of_the_same_name_updates_nothing(blender, run, scan, add_mesh, sphere):
+    first = run()
+    scan.select_set(False)
+    scan.name = "Renamed"
+    add_mesh("Scan", sphere)
+    assert not set(first.values()) & set(run().values())
+
+
+def test_a_surface_no_longer_asked_for_goes(run, scan):
+    assert "surface" in run()
+    assert set(run(surface="none")) == {"samples", "field"}
+    assert set(run()) == {"samples", "surface", "field"}
+
+
+def test_results_being_edited_stay_as_they_are(blender, run, scan, extension):
+    first = run()
+    vertices = len(first["surface"].data.vertices)
+    points_in, outcome = extension("vad_addon.points_in"), extension("vad_addon.outcome")
+    source = points_in.gather([scan], blender.context)
+    blender.context.view_layer.objects.active = first["surface"]
+    blender.ops.object.mode_set(mode="EDIT")
+    found = outcome.compute(
+        outcome.Task(source.points, extension("core.settings").Settings(resolution=16)), blender_temp(blender)
+    )
+    made = extension("vad_addon.delivery").deliver(blender.context.scene, source, found)
+    assert len(first["surface"].data.vertices) == vertices
+    assert not set(made.objects) & set(first.values())
+    (warning,) = extension("vad_addon.results").warnings(made)
+    assert "is being edited" in warning
+
+
+def blender_temp(bpy):
+    from pathlib import Path
+
+    return Path(bpy.app.tempdir)
+
+
+def test_an_update_is_one_undo_step(blender, run, scan):
+    blender.ops.ed.undo_push(message="before")
+    blender.ops.vad.reconstruct("EXEC_DEFAULT", True, resolution=24)
+    count = len(blender.data.meshes["Scan surface"].vertices)
+    blender.ops.vad.reconstruct("EXEC_DEFAULT", True, resolution=32)
+    assert len(blender.data.meshes["Scan surface"].vertices) > count
+    blender.ops.ed.undo()
+    assert len(blender.data.meshes["Scan surface"].vertices) == count
+    volume = blender.data.volumes["Scan field"]
+    assert volume.filepath == "//vad/Scan.vdb"
+    assert volume.grids.load()
+
+
+@pytest.mark.slow
+def test_cycles_shows_the_volume_at_any_scale(blender, run, scan):
+    scene = blender.context.scene
+    if "CYCLES" not in {item.identifier for item in scene.render.bl_rna.properties["engine"].enum_items}:
+        import addon_utils
+
+        addon_utils.enable("cycles")
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.device = 8, "CPU"
+    scene.render.resolution_x = scene.render.resolution_y = 32
+    scene.render.film_transparent = True
+    camera = blender.data.objects.new("Eye", blender.data.cameras.new("Eye"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.world = blender.data.worlds.new("Sky")  # in the dark Cycles leaves volumes out
+    for scale in (0.1, 100.0):
+        scan.scale = scale, scale, scale
+        made = run()
+        for role in ("samples", "surface"):
+            made[role].hide_render = True
+        scan.hide_render = True
+        camera.location = 0, 0, 4 * scale
+        camera.data.clip_end = 10 * scale
+        path = blender.app.tempdir + "cycles.png"
+        scene.render.filepath = path
+        blender.ops.render.render(write_still=True)
+        image = blender.data.images.load(path, check_existing=False)
+        alpha = np.array(image.pixels[:]).reshape(32, 32, 4)[..., 3]
+        blender.data.images.remove(image)
+        assert alpha[16, 16] > 0.5
+        assert alpha[0, 0] < 0.05

@@ -1,0 +1,227 @@
+"""Shells, slices and normals follow a result; axes fixed by hand hold in the next run."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+
+@pytest.fixture
+def scan(blender, add_mesh, sphere):
+    return add_mesh("Scan", sphere)
+
+
+@pytest.fixture
+def result(blender, scan, tmp_path):
+    """The results of a run on the sphere, by role."""
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    blender.ops.vad.reconstruct(resolution=32)
+    blender.context.view_layer.update()
+    return {obj["vad_role"]: obj for obj in blender.context.scene.vad.result.objects}
+
+
+def evaluated(bpy, obj):
+    """(n,3) world coordinates and the mesh that modifiers make of `obj`."""
+    final = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = final.to_mesh()
+    points = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", points.ravel())
+    matrix = np.array(final.matrix_world)
+    return points @ matrix[:3, :3].T + matrix[:3, 3], mesh
+
+
+CELL = 2 / 32 * 1.1  # about: the box is padded
+
+
+@pytest.mark.parametrize("operator", ["shell", "slice", "normals_to_geometry"])
+def test_without_results_there_is_nothing_to_look_at(blender, operator):
+    with pytest.raises(RuntimeError, match="There are no results yet: reconstruct first"):
+        getattr(blender.ops.vad, operator)()
+
+
+@pytest.mark.parametrize("operator", ["shell", "slice"])
+def test_without_a_volume_they_say_so(blender, result, operator):
+    blender.data.objects.remove(result["field"])
+    with pytest.raises(RuntimeError, match="Scan VAD has no volume: reconstruct again"):
+        getattr(blender.ops.vad, operator)()
+
+
+def test_a_shell_lies_at_its_distance_on_both_sides(blender, result):
+    assert blender.ops.vad.shell(offset=3) == {"FINISHED"}
+    shell = blender.context.active_object
+    cell = result["field"].data["vad_cell"]
+    for distance in (3 * cell, 2 * cell):
+        shell.modifiers[0].threshold = distance
+        points, mesh = evaluated(blender, shell)
+        radius = np.linalg.norm(points, axis=1)
+        assert_allclose(np.abs(radius - 1), distance, atol=0.6 * cell)
+        assert (radius > 1).any()
+        assert (radius < 1).any()
+        assert len(mesh.polygons) > 100
+
+
+def test_a_slice_shows_the_distance_where_it_lies(blender, result):
+    if blender.app.version < (5, 0, 0):
+        pytest.skip("Sample Grid is new in 5.0")
+    blender.ops.vad.slice(axis="Z")
+    plane = blender.context.active_object
+    cell = result["field"].data["vad_cell"]
+    for height, turn in ((0.0, 0.0), (0.4, 0.3)):
+        plane.location.z, plane.rotation_euler.x = height, turn
+        blender.context.view_layer.update()
+        points, mesh = evaluated(blender, plane)
+        distance = np.empty(len(points), np.float32)
+        mesh.attributes["distance"].data.foreach_get("value", distance)
+        inside = (np.abs(points) < 1).all(axis=1)
+        assert inside.sum() > 1000
+        assert_allclose(distance[inside], np.abs(np.linalg.norm(points[inside], axis=1) - 1), atol=cell)
+
+
+def test_normals_become_curves_through_the_samples(blender, result, sphere):
+    blender.ops.vad.normals_to_geometry(length=4, every=5)
+    curves = blender.context.active_object
+    assert curves.type == "CURVES"
+    ends = np.empty(6 * 100, np.float32)
+    curves.data.attributes["position"].data.foreach_get("vector", ends)
+    ends = ends.reshape(100, 2, 3) + np.array(result["samples"].location)
+    radius = result["samples"].data.attributes["radius"].data[0].value
+    assert_allclose(ends.mean(axis=1), sphere[::5], atol=1e-6)
+    assert_allclose(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), 4 * radius, rtol=1e-5)
+
+
+def test_each_takes_one_undo_step_and_follows_the_result(blender, result):
+    blender.ops.ed.undo_push(message="before")
+    for operator in ("shell", "slice", "normals_to_geometry"):
+        before = {obj.name for obj in blender.data.objects}
+        getattr(blender.ops.vad, operator)("EXEC_DEFAULT", True)
+        made = blender.context.active_object
+        assert made.parent is not None
+        assert made.users_collection == (blender.context.scene.vad.result,)
+        blender.ops.ed.undo()
+        assert {obj.name for obj in blender.data.objects} == before
+
+
+def test_the_lines_are_thinned_out_evenly(extension):
+    segments = extension("vad_addon.overlay").segments
+    points, normals = np.arange(300.0).reshape(100, 3), np.tile([0.0, 0, 1], (100, 1))
+    ends, rows = segments(points, normals, np.full(100, 0.5), every=3, maximum=1000)
+    assert rows.tolist() == list(range(0, 100, 3))
+    assert_allclose(ends[:2], [[0, 1, 1.5], [0, 1, 2.5]])
+    _, rows = segments(points, normals, 0.5, every=1, maximum=12)
+    assert len(rows) == 12
+    assert (rows[0], rows[-1]) == (0, 99)
+    assert np.ptp(np.diff(rows)) <= 1
+
+
+@pytest.mark.parametrize("by", ["SINGLE", "DIRECTION", "CONFIDENCE"])
+def test_the_lines_take_their_colour_from_what_is_asked(blender, extension, by):
+    style = blender.context.scene.vad.overlay
+    style.colour_by = by
+    normals, confidence = np.array([[0, 0, -1.0], [0, 1, 0]]), np.array([0.0, 1.0])
+    found = extension("vad_addon.overlay").colours(style, normals, confidence)
+    expected = {
+        "SINGLE": [[0.1, 0.9, 1.0]] * 2,
+        "DIRECTION": [[0, 0, 1], [0, 1, 0]],
+        "CONFIDENCE": [[0.9, 0.1, 0.1], [0.1, 0.9, 0.2]],
+    }
+    assert_allclose(found[:, :3], expected[by], atol=1e-6)
+
+
+def test_the_overlay_costs_nothing_while_it_is_off(blender, extension):
+    overlay = extension("vad_addon.overlay")
+    handlers = len(blender.app.handlers.depsgraph_update_post)
+    assert overlay._handle is None
+    blender.context.scene.vad.overlay.show = True
+    assert overlay._handle is not None
+    assert len(blender.app.handlers.depsgraph_update_post) == handlers + 1
+    blender.ops.wm.read_factory_settings(use_empty=True)  # a file in which it is off
+    assert overlay._handle is None
+    assert len(blender.app.handlers.depsgraph_update_post) == handlers
+
+
+# Axes fixed by hand
+
+
+@pytest.fixture
+def edited(blender, scan):
+    """The sphere in edit mode with its first three points selected; scaled, so that spaces are told apart."""
+    scan.scale = 1, 2, 1
+    blender.context.view_layer.update()
+    blender.ops.object.mode_set(mode="EDIT")
+    import bmesh
+
+    mesh = bmesh.from_edit_mesh(scan.data)
+    for vertex in mesh.verts:
+        vertex.select = vertex.index < 3
+    return scan
+
+
+def constraints(bpy, extension):
+    points_in = extension("vad_addon.points_in")
+    found = points_in.gather(points_in.sources(bpy.context), bpy.context).constraints
+    if found is None:
+        return None
+    indices, axes = found
+    return indices.tolist(), axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+def test_typed_axes_reach_the_run_in_world_space(blender, extension, edited):
+    blender.ops.vad.fix_axes(origin="TYPED", axis=(1, 1, 0))
+    indices, axes = constraints(blender, extension)
+    assert indices == [0, 1, 2]
+    assert_allclose(axes, [np.array([1, 1, 0]) / 2**0.5] * 3, atol=1e-6)
+
+
+def test_axes_towards_the_cursor(blender, extension, edited, sphere):
+    blender.context.scene.cursor.location = 5, 0, 0
+    blender.ops.vad.fix_axes(origin="CURSOR")
+    _, axes = constraints(blender, extension)
+    towards = np.array([5, 0, 0]) - sphere[:3] * [1, 2, 1]
+    assert_allclose(axes, towards / np.linalg.norm(towards, axis=1, keepdims=True), atol=1e-5)
+
+
+def test_axes_of_the_active_element(blender, extension, edited):
+    with pytest.raises(RuntimeError, match="The active element has no axis"):
+        blender.ops.vad.fix_axes(origin="ACTIVE")
+    blender.ops.vad.fix_axes(origin="TYPED", axis=(0, 1, 0))
+    import bmesh
+
+    mesh = bmesh.from_edit_mesh(edited.data)
+    mesh.verts.ensure_lookup_table()
+    mesh.select_history.add(mesh.verts[1])
+    mesh.verts[9].select = True
+    blender.ops.vad.fix_axes(origin="ACTIVE")
+    indices, axes = constraints(blender, extension)
+    assert indices == [0, 1, 2, 9]
+    assert_allclose(np.abs(axes), [[0, 1, 0]] * 4, atol=1e-6)
+
+
+def test_freed_axes_are_gone(blender, extension, edited):
+    blender.ops.vad.fix_axes(origin="TYPED")
+    blender.ops.vad.free_axes()
+    assert constraints(blender, extension) is None
+
+
+@pytest.mark.parametrize("problem", ["length 0", "are selected"])
+def test_what_cannot_be_fixed_is_said(blender, edited, problem):
+    if problem == "are selected":
+        blender.ops.mesh.select_all(action="DESELECT")
+    with pytest.raises(RuntimeError, match=problem):
+        blender.ops.vad.fix_axes(origin="TYPED", axis=(0, 0, 0 if problem == "length 0" else 1))
+
+
+def test_fixed_axes_hold_in_the_run_and_live_in_the_file(blender, tmp_path, edited):
+    blender.ops.vad.fix_axes(origin="TYPED", axis=(1, 0, 0))
+    blender.ops.object.mode_set(mode="OBJECT")
+    path = str(tmp_path / "axes.blend")
+    blender.ops.wm.save_as_mainfile(filepath=path)
+    blender.ops.wm.open_mainfile(filepath=path)
+    blender.ops.vad.reconstruct(resolution=24)
+    samples = next(obj for obj in blender.context.scene.vad.result.objects if obj["vad_role"] == "samples")
+    normals = np.empty(3 * 500, np.float32)
+    samples.data.attributes["normal"].data.foreach_get("vector", normals)
+    assert_allclose(np.abs(normals.reshape(-1, 3)[:3]), [[1, 0, 0]] * 3, atol=1e-6)
+
+
+def test_outside_edit_mode_they_say_what_to_do(blender, scan):
+    with pytest.raises(RuntimeError, match="Enter edit mode of a mesh and select the points whose axis you know"):
+        blender.ops.vad.fix_axes()

@@ -1,0 +1,57 @@
+"""Text files become meshes of loose vertices, by name and place."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+
+def coordinates(obj):
+    flat = np.empty(3 * len(obj.data.vertices), np.float32)
+    obj.data.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3) + np.array(obj.location, np.float64)
+
+
+@pytest.mark.parametrize("ending", [".xyz", ".pts", ".txt", ".csv"])
+def test_a_file_becomes_the_active_object(blender, tmp_path, sphere, ending):
+    path = tmp_path / f"Scan{ending}"
+    np.savetxt(path, sphere, delimiter="," if ending == ".csv" else " ")
+    assert blender.ops.vad.import_points(filepath=str(path)) == {"FINISHED"}
+    obj = blender.context.active_object
+    assert (obj.name, obj.type) == ("Scan", "MESH")
+    assert_allclose(coordinates(obj), sphere, atol=1e-6)
+    assert blender.ops.vad.reconstruct.poll()
+
+
+def test_dropped_files_become_an_object_each(blender, tmp_path, sphere):
+    for name in ("a.xyz", "b.xyz"):
+        np.savetxt(tmp_path / name, sphere)
+    files = [{"name": "a.xyz"}, {"name": "b.xyz"}]
+    assert blender.ops.vad.import_points(directory=str(tmp_path), files=files) == {"FINISHED"}
+    assert [obj.name for obj in blender.context.selected_objects] == ["a", "b"]
+
+
+def test_the_file_handler_names_the_importer_and_its_files(blender):
+    handler = blender.types.VAD_FH_points
+    assert handler.bl_import_operator == "vad.import_points"
+    assert handler.bl_file_extensions == ".xyz;.pts;.txt;.csv"
+
+
+def test_large_coordinates_keep_their_detail(blender, tmp_path, sphere):
+    np.savetxt(tmp_path / "far.xyz", sphere + np.array([3.5e5, 5.5e6, 120]), fmt="%.9f")
+    blender.ops.vad.import_points(filepath=str(tmp_path / "far.xyz"))
+    assert_allclose(coordinates(blender.context.active_object) - [3.5e5, 5.5e6, 120], sphere, atol=1e-6)
+
+
+def test_points_that_are_nowhere_are_left_out_and_counted(blender, tmp_path, capfd):
+    (tmp_path / "holes.xyz").write_text("0 0 0\nnan 0 1\n1 2 3\n")
+    blender.ops.vad.import_points(filepath=str(tmp_path / "holes.xyz"))
+    assert len(blender.context.active_object.data.vertices) == 2
+    assert "Warning: holes: 1 points left out" in capfd.readouterr().out
+
+
+def test_a_file_that_cannot_be_read_is_one_sentence_and_no_object(blender, tmp_path):
+    (tmp_path / "bad.xyz").write_text("no numbers here\n")
+    with pytest.raises(RuntimeError, match=r"bad\.xyz") as caught:
+        blender.ops.vad.import_points(filepath=str(tmp_path / "bad.xyz"))
+    assert "Traceback" not in str(caught.value)
+    assert not blender.data.objects

@@ -1,0 +1,89 @@
+"""Presets and preferences are settings by another name."""
+
+from pathlib import Path
+
+import pytest
+
+SHIPPED = Path(__file__).resolve().parents[2] / "vad_addon" / "presets" / "vad" / "reconstruct"
+NAMES = "Clean scan", "Noisy scan", "Sparse", "Thin sheets and cloth", "Huge"
+
+
+@pytest.fixture
+def stored(blender):
+    return blender.context.scene.vad
+
+
+def apply(bpy, name):
+    path = next(Path(folder, f"{name}.py") for folder in bpy.utils.preset_paths("vad/reconstruct"))
+    bpy.ops.script.execute_preset(filepath=str(path), menu_idname="VAD_PT_presets")
+
+
+def settings(extension, stored):
+    class Nothing:
+        def is_property_set(self, name):
+            return False
+
+    return extension("vad_addon.properties").settings_from(stored, Nothing())
+
+
+def test_these_are_shipped(blender):
+    assert {path.stem for path in SHIPPED.glob("*.py")} == set(NAMES)
+    assert str(SHIPPED) in blender.utils.preset_paths("vad/reconstruct")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_is_valid_and_undoes_the_others(blender, extension, stored, name):
+    apply(blender, name)
+    alone = settings(extension, stored)
+    assert alone != extension("core.settings").Settings()
+    for other in NAMES:
+        apply(blender, other)
+    apply(blender, name)
+    assert settings(extension, stored) == alone
+
+
+def test_a_preset_of_ones_own_keeps_every_setting(blender, extension, stored, tmp_path, monkeypatch):
+    (tmp_path / "presets/vad/reconstruct").mkdir(parents=True)
+    monkeypatch.setattr(blender.utils, "user_resource", lambda *_, path="", **__: str(tmp_path / path))
+    stored.resolution, stored.bridge, stored.denoise = 77, 2.5, "0.5"
+    wanted = settings(extension, stored)
+    assert blender.ops.vad.add_preset(name="Mine") == {"FINISHED"}
+    (made,) = tmp_path.rglob("Mine.py")
+    stored.resolution, stored.bridge, stored.denoise = 33, 9.0, "auto"
+    blender.ops.script.execute_preset(filepath=str(made), menu_idname="VAD_PT_presets")
+    assert settings(extension, stored) == wanted
+
+
+class Preferences:
+    resolution, backend, memory_limit = 200, "numpy", "auto"
+
+
+def test_scenes_start_with_what_the_user_prefers(blender, extension, stored, monkeypatch):
+    preferences = extension("vad_addon.preferences")
+    other = blender.data.scenes.new("Chosen already")
+    other.vad.resolution = 50
+
+    class Installed:
+        preferences = Preferences
+
+    class Context:
+        class preferences:
+            addons = {extension("vad_addon.volume_files").PACKAGE: Installed}
+
+    monkeypatch.setattr(preferences.bpy, "context", Context, raising=False)
+    preferences.prepare_scenes()
+    assert (stored.resolution, stored.backend) == (200, "numpy")
+    assert other.vad.resolution == 50
+    assert not stored.is_property_set("memory_limit")
+
+
+def test_clearing_the_cache_spares_what_is_shown(blender, extension, add_mesh, sphere):
+    files = extension("vad_addon.volume_files")
+    add_mesh("Scan", sphere)
+    for _ in range(2):
+        blender.ops.vad.reconstruct(resolution=16)
+    assert files.cache_contents()[0] >= 2
+    assert blender.ops.vad.clear_cache() == {"FINISHED"}
+    count, size = files.cache_contents()
+    assert (count, size > 1000) == (1, True)
+    assert blender.data.volumes["Scan field"].grids.load()

@@ -1,0 +1,72 @@
+"""Axes fixed by hand: an attribute on the source's points, so that they live in the .blend and hold in the next run."""
+
+import bmesh
+import bpy
+import numpy as np
+
+from ..core.errors import InputError
+from .points_in import AXIS
+
+
+def held_by(obj: bpy.types.Object) -> bool:
+    """Whether some points of `obj` may have a fixed axis."""
+    if obj.type == "MESH" and obj.mode == "EDIT":
+        return bmesh.from_edit_mesh(obj.data).verts.layers.float_vector.get(AXIS) is not None
+    return obj.type in {"MESH", "POINTCLOUD"} and AXIS in obj.data.attributes
+
+
+def read(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """The points of `obj` that have a fixed axis, (k,3), and these, (k,3) unit, both in the object's space."""
+    if obj.type == "MESH" and obj.mode == "EDIT":
+        mesh = bmesh.from_edit_mesh(obj.data)
+        layer = mesh.verts.layers.float_vector[AXIS]
+        held = [(vertex.co, vertex[layer]) for vertex in mesh.verts if any(vertex[layer])]
+        both = np.array(held, np.float64).reshape(-1, 2, 3)
+        points, axes = both[:, 0], both[:, 1]
+    else:
+        points, axes = (_vectors(obj.data.attributes[name]) for name in ("position", AXIS))
+        held = axes.any(axis=1)
+        points, axes = points[held], axes[held]
+    return points, axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+def fix(obj: bpy.types.Object, axes) -> int:
+    """Give the selected vertices of the mesh `obj`, in edit mode, this axis: a function from the coordinates (k,3) to
+    axes (k,3) or one axis (3,), in the object's space. Zeros free them. Returns how many there are.
+
+    Raises :class:`InputError` where nothing is selected.
+    """
+    mesh = bmesh.from_edit_mesh(obj.data)
+    layers = mesh.verts.layers.float_vector
+    layer = layers.get(AXIS) or layers.new(AXIS)
+    chosen = [vertex for vertex in mesh.verts if vertex.select]
+    if not chosen:
+        raise InputError(f"0 points of {obj.name} are selected: select those whose axis you know")
+    wanted = axes(np.array([vertex.co for vertex in chosen]))
+    for vertex, axis in zip(chosen, np.broadcast_to(wanted, (len(chosen), 3)), strict=True):
+        vertex[layer] = axis
+    bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
+    return len(chosen)
+
+
+def of_active(obj: bpy.types.Object) -> np.ndarray:
+    """Axis (3,) that the active element of the mesh `obj`, in edit mode, stands for: the normal of a face, the
+    direction of an edge, the fixed axis of a vertex. Raises :class:`InputError` where there is none."""
+    mesh = bmesh.from_edit_mesh(obj.data)
+    active, layer = mesh.select_history.active, mesh.verts.layers.float_vector.get(AXIS)
+    axis = np.zeros(3)
+    if isinstance(active, bmesh.types.BMFace):
+        axis = np.array(active.normal)
+    elif isinstance(active, bmesh.types.BMEdge):
+        axis = np.array(active.verts[1].co - active.verts[0].co)
+    elif active is not None and layer is not None:
+        axis = np.array(active[layer])
+    if not axis.any():
+        raise InputError("The active element has no axis: make a face, an edge or a point with a fixed axis active")
+    return axis
+
+
+def _vectors(attribute):
+    flat = np.empty(3 * len(attribute.data), np.float32)
+    attribute.data.foreach_get("vector", flat)
+    return flat.reshape(-1, 3)

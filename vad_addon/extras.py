@@ -1,0 +1,184 @@
+"""Operators that are instant: shapes that follow a result, and axes fixed by hand. Their redo panels are live."""
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ..core.errors import InputError, VADError
+from . import axes, results, shapes
+
+
+def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
+    """The run whose results are meant: the one the active object belongs to, else the scene's last."""
+    obj = context.active_object
+    if obj is not None:
+        for collection in obj.users_collection:
+            if results.REPORT in collection:
+                return collection
+        if made := results.previous(context.scene, obj):
+            return made
+    return context.scene.vad.result
+
+
+class _OfResult:
+    """An operator that adds an object to the results of a run and makes it the active one."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("There are no results yet: reconstruct first")
+        return chosen_result(context) is not None
+
+    def execute(self, context):
+        try:
+            obj = self.make(chosen_result(context))
+        except VADError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        for other in context.selected_objects:
+            other.select_set(False)
+        context.view_layer.objects.active = obj
+        obj.select_set(True)
+        return {"FINISHED"}
+
+
+class VAD_OT_shell(_OfResult, bpy.types.Operator):
+    """Add a closed mesh at some distance from the surface, on both sides of it. It follows the volume; its modifier's
+    threshold changes the distance at once"""
+
+    bl_idname = "vad.shell"
+    bl_label = "Offset Surface"
+
+    offset: bpy.props.FloatProperty(
+        name="Offset", description="Distance from the surface. Unit: grid cells", default=1.5, min=0.5, soft_max=20.0
+    )
+
+    def make(self, collection):
+        return shapes.shell(collection, self.offset)
+
+
+class VAD_OT_slice(_OfResult, bpy.types.Operator):
+    """Add a plane that shows the distances where it lies, with iso-lines. Move and turn it to look around"""
+
+    bl_idname = "vad.slice"
+    bl_label = "Slice"
+
+    axis: bpy.props.EnumProperty(
+        name="Across",
+        description="Axis that the plane cuts across",
+        items=[(name, name, f"Cut across the {name} axis") for name in "XYZ"],
+        default="Y",
+    )
+
+    def make(self, collection):
+        return shapes.cut(collection, "XYZ".index(self.axis))
+
+    def invoke(self, context, event):
+        shading = getattr(context.space_data, "shading", None)
+        if shading is not None and shading.type in {"SOLID", "WIREFRAME"}:
+            shading.type = "MATERIAL"  # the others show no colours
+        return self.execute(context)
+
+
+class VAD_OT_normals_to_geometry(_OfResult, bpy.types.Operator):
+    """Add the normals as curves, which render, unlike the overlay"""
+
+    bl_idname = "vad.normals_to_geometry"
+    bl_label = "Normals to Geometry"
+
+    length: bpy.props.FloatProperty(
+        name="Length", description="Length of a line. Unit: sizes of a sample", default=6.0, min=0.1, soft_max=40.0
+    )
+    thickness: bpy.props.FloatProperty(
+        name="Thickness",
+        description="Thickness of a line. Unit: sizes of a sample",
+        default=0.3,
+        min=0.01,
+        soft_max=2.0,
+    )
+    every: bpy.props.IntProperty(name="Every", description="Take only every n-th sample", default=1, min=1)
+
+    def invoke(self, context, event):
+        overlay = context.scene.vad.overlay
+        self.length, self.every = overlay.length, overlay.every
+        return self.execute(context)
+
+    def make(self, collection):
+        return shapes.normals(collection, self.length, self.thickness, self.every)
+
+
+class _OfEditedMesh:
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Enter edit mode of a mesh and select the points whose axis you know")
+        return context.mode == "EDIT_MESH"
+
+    def execute(self, context):
+        try:
+            count = axes.fix(context.active_object, lambda points: self.axes(context, points))
+        except VADError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"{count:,} points {self.done}")
+        return {"FINISHED"}
+
+
+class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
+    """Fix the normal's axis at the selected points; the next run holds to it"""
+
+    bl_idname = "vad.fix_axes"
+    bl_label = "Fix Axes"
+    done = "fixed"
+
+    origin: bpy.props.EnumProperty(
+        name="From",
+        description="Where the axis comes from",
+        items=[
+            ("VIEW", "View", "The direction you look in"),
+            ("ACTIVE", "Active Element", "Normal of the active face, direction of the active edge, axis of the vertex"),
+            ("CURSOR", "3D Cursor", "From each point towards the 3D cursor"),
+            ("TYPED", "Typed", "The axis typed below"),
+        ],
+    )
+    axis: bpy.props.FloatVectorProperty(
+        name="Axis", description="The axis, in world space; its sign and length do not matter", default=(0, 0, 1)
+    )
+
+    def draw(self, context):
+        self.layout.prop(self, "origin")
+        if self.origin == "TYPED":
+            self.layout.prop(self, "axis")
+
+    def axes(self, context, points):
+        obj = context.active_object
+        matrix = np.array(obj.matrix_world, np.float64)
+        if self.origin == "ACTIVE":
+            return axes.of_active(obj)
+        if self.origin == "CURSOR":
+            world = np.array(context.scene.cursor.location) - (points @ matrix[:3, :3].T + matrix[:3, 3])
+        elif self.origin == "VIEW":
+            if context.region_data is None:
+                raise InputError("No view to take the axis from: run this in a 3D viewport, or type the axis")
+            world = np.array(context.region_data.view_rotation @ Vector((0, 0, 1)))
+        else:
+            world = np.array(self.axis)
+        if not np.linalg.norm(world, axis=-1).all():
+            raise InputError("An axis of length 0 has no direction: give another one")
+        return world @ matrix[:3, :3]  # normals go from world to object space by the transposed matrix
+
+
+class VAD_OT_free_axes(_OfEditedMesh, bpy.types.Operator):
+    """Let the selected points find their normals by themselves again"""
+
+    bl_idname = "vad.free_axes"
+    bl_label = "Free Axes"
+    done = "freed"
+
+    def axes(self, context, points):
+        return np.zeros(3)
+
+
+CLASSES = VAD_OT_shell, VAD_OT_slice, VAD_OT_normals_to_geometry, VAD_OT_fix_axes, VAD_OT_free_axes

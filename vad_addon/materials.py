@@ -1,0 +1,86 @@
+"""How the volume and its slices look, at every scale."""
+
+import bpy
+
+CELL = "vad_cell"  # custom property of a volume: the grid spacing that its densities are made for
+_FOG = "vad_fog"  # custom property that tells our materials from the user's
+_OPACITY = 1.5  # optical depth per cell where the fog is densest, in renders; it fades out over two cells
+_FAR = 40.0  # cells at which a slice reaches its last colour
+_NEAR_AND_FAR = (1.0, 0.85, 0.3, 1.0), (0.05, 0.15, 0.5, 1.0)
+_DISPLAY = 0.5  # the same in the viewport's solid view
+
+
+def fit_fog(volume: bpy.types.Volume, cell: float) -> None:
+    """Make the fog of `volume` suit grid cells of this size, in renders and in the viewport.
+
+    A volume seen for the first time gets a material. Later only its densities follow the cell, so that whatever the
+    user changed stays.
+    """
+    if CELL not in volume:
+        volume.materials.append(_fog_material(volume.name, cell))
+        volume.display.density = _DISPLAY / cell
+    else:
+        ratio = volume[CELL] / cell
+        volume.display.density *= ratio
+        for material in volume.materials:
+            if material is not None and _FOG in material:
+                for node in _principled(material):
+                    node.inputs["Density"].default_value *= ratio
+    volume[CELL] = cell
+
+
+def _fog_material(name, cell):
+    material = bpy.data.materials.new(name)
+    material[_FOG] = True
+    if material.node_tree is None:  # before Blender 5.0
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    volume, output = nodes.new("ShaderNodeVolumePrincipled"), nodes.new("ShaderNodeOutputMaterial")
+    volume.inputs["Color"].default_value = 0.35, 0.65, 1.0, 1.0
+    volume.inputs["Density"].default_value = _OPACITY / cell
+    output.location.x = 300
+    links.new(volume.outputs["Volume"], output.inputs["Volume"])
+    return material
+
+
+def iso_lines(name: str, cell: float) -> bpy.types.Material:
+    """A material that emits a colour for the attribute `distance` and draws a dark line every two cells."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # before Blender 5.0
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+
+    def node(kind, **inputs):
+        made = nodes.new(kind)
+        made.location.x = 200 * len(nodes)
+        for key, value in inputs.items():
+            made.inputs[int(key[1:])].default_value = value
+        return made
+
+    def math(operation, source, value):
+        made = node("ShaderNodeMath", _1=value)
+        made.operation = operation
+        links.new(source, made.inputs[0])
+        return made.outputs[0]
+
+    distance = node("ShaderNodeAttribute")
+    distance.attribute_name = "distance"
+    lines = math("DIVIDE", distance.outputs["Fac"], 2 * cell)
+    ramp = node("ShaderNodeValToRGB")
+    for element, colour in zip(ramp.color_ramp.elements, _NEAR_AND_FAR, strict=True):
+        element.color = colour
+    links.new(math("DIVIDE", distance.outputs["Fac"], _FAR * cell), ramp.inputs["Fac"])
+    line = math("LESS_THAN", math("FRACT", lines, 0.0), 0.12)
+    mix = node("ShaderNodeMixRGB", _2=(0.02, 0.02, 0.05, 1.0))
+    links.new(line, mix.inputs[0])
+    links.new(ramp.outputs["Color"], mix.inputs[1])
+    emission, output = node("ShaderNodeEmission"), node("ShaderNodeOutputMaterial")
+    links.new(mix.outputs[0], emission.inputs["Color"])
+    links.new(emission.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def _principled(material):
+    return [node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeVolumePrincipled"]

@@ -1,0 +1,149 @@
+"""One run, from points to arrays that Blender can take as they are. Free of Blender: the worker process runs it too."""
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..core import pipeline
+from ..core.errors import VADError
+from ..core.io.report import report_json
+from ..core.io.vdb import write_vdb
+from ..core.progress import Progress
+from ..core.settings import Settings
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a run is given: (n,3) float64 points, settings, and (indices (k,), axes (k,3)) or None."""
+
+    points: np.ndarray
+    settings: Settings
+    constraints: tuple[np.ndarray, np.ndarray] | None = None
+
+    def save(self, path: Path) -> None:
+        indices, axes = self.constraints or (np.empty(0, np.int64), np.empty((0, 3)))
+        settings = json.dumps(asdict(self.settings))
+        np.savez(path, points=self.points, indices=indices, axes=axes, settings=settings)
+
+    @classmethod
+    def load(cls, path: Path) -> "Task":
+        with np.load(path) as arrays:
+            constraints = (arrays["indices"], arrays["axes"]) if len(arrays["indices"]) else None
+            return cls(arrays["points"], Settings(**json.loads(str(arrays["settings"]))), constraints)
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A triangle mesh and what its vertices know.
+
+    vertices : (v,3) float64 in input units     faces    : (f,3) int32
+    nearest  : (v,) int64, the nearest sample   distance : (v,) float64, the field there, in input units
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    nearest: np.ndarray
+    distance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run found, in input units; see :class:`core.Reconstruction` for points, source_index, normals, confidence.
+
+    surface  : Skin of the double cover, or None
+    volume   : .vdb file of the field, relative to `origin`, or None; it belongs to whoever takes the outcome
+    origin   : (3,) float64, centre of the samples, exact in single precision
+    cell     : float, spacing of the field's grid
+    shape    : nodes of the grid along each axis
+    report   : JSON text
+    warnings : what went less than well, one line each
+    seconds  : duration of the reconstruction
+    """
+
+    points: np.ndarray
+    source_index: np.ndarray
+    normals: np.ndarray
+    confidence: np.ndarray
+    surface: Skin | None
+    volume: Path | None
+    origin: np.ndarray
+    cell: float
+    shape: tuple[int, int, int]
+    report: str
+    warnings: tuple[str, ...]
+    seconds: float
+
+    def save(self, path: Path) -> None:
+        arrays = {name: getattr(self, name) for name in ("points", "source_index", "normals", "confidence", "origin")}
+        if self.surface is not None:
+            arrays |= {f"surface.{name}": array for name, array in vars(self.surface).items()}
+        facts = {name: getattr(self, name) for name in ("cell", "shape", "report", "warnings", "seconds")}
+        facts["volume"] = self.volume and str(self.volume)
+        np.savez(path, **arrays, facts=json.dumps(facts))
+
+    @classmethod
+    def load(cls, path: Path) -> "Outcome":
+        with np.load(path) as file:
+            arrays = dict(file)
+        facts = json.loads(str(arrays.pop("facts")))
+        facts |= dict(
+            shape=tuple(facts["shape"]),
+            warnings=tuple(facts["warnings"]),
+            volume=Path(facts["volume"]) if facts["volume"] else None,
+        )
+        skin = {name: arrays.pop(f"surface.{name}") for name in Skin.__annotations__ if f"surface.{name}" in arrays}
+        return cls(**arrays, **facts, surface=Skin(**skin) if skin else None)
+
+
+def compute(task: Task, folder: Path, progress=None) -> Outcome:
+    """Reconstruct, and write the volume into `folder`. A volume that cannot be written is a warning, no failure.
+
+    Raises :class:`VADError` for what the core refuses and where memory runs out.
+    """
+    try:
+        return _compute(task, folder, Progress.of(progress))
+    except MemoryError as error:
+        raise VADError("Out of memory: lower the resolution, or give fewer points") from error
+
+
+def _compute(task, folder, progress):
+    progress.part(0.0, 0.0, "points")(0.0)
+    result = pipeline.reconstruct(task.points, task.settings, task.constraints, progress.part(0.0, 0.95))
+    origin = centre(result.points)
+    finish = progress.part(0.95, 1.0, "volume")
+    finish(0.0)
+    warnings = list(result.report["warnings"])
+    volume = folder / "field.vdb"
+    try:
+        write_vdb(volume, replace(result.field, origin=result.field.origin - origin))
+    except VADError as error:
+        warnings.append(f"No volume: {error}")
+        volume = None
+    finish(1.0)
+    return Outcome(
+        points=result.points,
+        source_index=result.source_index,
+        normals=result.normals,
+        confidence=result.confidence,
+        surface=result.surface and _skin(result.surface, result),
+        volume=volume,
+        origin=origin,
+        cell=result.field.spacing,
+        shape=result.field.values.shape,
+        report=report_json(result.report),
+        warnings=tuple(warnings),
+        seconds=sum(result.report["seconds"].values()),
+    )
+
+
+def _skin(mesh, result):
+    _, nearest = KDTree(result.points).query(mesh.vertices, workers=-1)
+    return Skin(mesh.vertices, mesh.faces, nearest, result.field.sample(mesh.vertices))
+
+
+def centre(points: np.ndarray) -> np.ndarray:
+    """Centre of the bounding box of (n,3) points, rounded to what an object's location can hold exactly."""
+    return (0.5 * (points.min(axis=0) + points.max(axis=0))).astype(np.float32).astype(np.float64)

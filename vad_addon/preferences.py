@@ -1,0 +1,61 @@
+"""The extension's preferences: what new scenes start with, and the cache folder."""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..core.errors import VADError
+from ..core.settings import options
+from . import volume_files
+from .properties import setting_property
+
+PREFERRED = "resolution", "backend", "memory_limit"  # settings with a default of the user's own
+
+
+class VAD_OT_clear_cache(bpy.types.Operator):
+    """Delete the volumes in the cache folder, where those go that are made before a file is saved. The ones that this
+    file shows stay; for other files that show some, run again"""
+
+    bl_idname = "vad.clear_cache"
+    bl_label = "Clear Cache"
+    bl_options = {"INTERNAL"}
+
+    def execute(self, context):
+        try:
+            freed = volume_files.clear_cache()
+        except VADError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.report({"INFO"}, f"Freed {freed / 2**20:,.1f} MiB")
+        return {"FINISHED"}
+
+
+class VAD_preferences(bpy.types.AddonPreferences):
+    bl_idname = volume_files.PACKAGE
+
+    __annotations__ = {
+        name: setting_property(options()[name], update=lambda self, context: prepare_scenes()) for name in PREFERRED
+    }
+
+    def draw(self, context):
+        column = self.layout.column(heading="Defaults for scenes in which nothing else was chosen")
+        column.use_property_split = True
+        for name in PREFERRED:
+            column.prop(self, name)
+        files, size = volume_files.cache_contents()
+        row = self.layout.row()
+        row.label(text=f"Cache: {size / 2**20:,.1f} MiB in {files} files", icon="FILE_CACHE")
+        row.operator("wm.path_open", text="Open Folder").filepath = str(volume_files.cache_folder())
+        row.operator(VAD_OT_clear_cache.bl_idname, icon="TRASH")
+
+
+@persistent
+def prepare_scenes(*_) -> None:
+    """Give every scene in which they were not chosen yet the settings that the user prefers."""
+    addon = bpy.context.preferences.addons.get(volume_files.PACKAGE)
+    if addon is None or addon.preferences is None:  # run from a checkout
+        return
+    for name in PREFERRED:
+        preferred = getattr(addon.preferences, name)
+        for scene in bpy.data.scenes:
+            if not scene.vad.is_property_set(name) and preferred != getattr(scene.vad, name):
+                setattr(scene.vad, name, preferred)
