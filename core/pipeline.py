@@ -18,6 +18,7 @@ from .reconstruction import Reconstruction
 from .settings import Settings
 from .surface.double_cover import double_cover
 from .surface.mesh import Mesh
+from .surface.signed import signed_distance, signed_mesh
 from .surface.single_layer import single_layer
 
 
@@ -38,7 +39,8 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
     >>> abs(result.field.sample([[0, 0, 1.5]])[0] - 0.5) < 0.01
     True
 
-    Raises :class:`InputError` for points or constraints that cannot be used, :class:`MissingDependency` where no
+    Raises :class:`InputError` for points or constraints that cannot be used and for signed distance of a shape that is
+    not closed, :class:`MissingDependency` where no
     library that extracts iso-surfaces is found, :class:`Cancelled` where `progress` says so.
     """
     progress, stages = Progress.of(progress), _Stages()
@@ -59,13 +61,19 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
 
     with stages("field"):
         local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge)
-        values, band = distance_field(local, grid, progress.part(0.2, 0.8, "distance field"))
+        values, band = distance_field(local, grid, settings.integration, progress.part(0.2, 0.8, "distance field"))
 
     surface = sheet = None
+    signed = settings.surface == "signed"
     unoriented = 0
     with stages("surface"):
         if settings.surface in ("double", "both"):
             surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 0.9, "double cover"))
+            surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
+        if signed:
+            part = progress.part(0.8, 0.9, "sides")
+            values = signed_distance(values, band, local, grid, samples.to_input_units, part)
+            surface = signed_mesh(values, local, grid, progress.part(0.9, 1.0, "signed surface"))
             surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
         if settings.surface in ("single", "both"):
             sheet, unoriented = single_layer(band, local, grid, progress.part(0.9, 1.0, "single layer"))
@@ -90,7 +98,7 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         "cleaning": cleaning,
         "meshes": {
             name: {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": mesh.border_loops()}
-            for name, mesh in (("double", surface), ("single", sheet))
+            for name, mesh in (("signed" if signed else "double", surface), ("single", sheet))
             if mesh is not None
         },
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
@@ -106,7 +114,10 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         normals=normals,
         confidence=confidence,
         field=DistanceField(
-            values * np.float32(samples.scale), samples.to_input_units(grid.origin), grid.spacing * samples.scale
+            values * np.float32(samples.scale),
+            samples.to_input_units(grid.origin),
+            grid.spacing * samples.scale,
+            sdf=signed,
         ),
         surface=surface,
         sheet=sheet,

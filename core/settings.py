@@ -46,14 +46,21 @@ class Settings:
     surface: str = _option(
         "double",
         "Mesh to extract: the double cover, closed and two-sided; the single layer, one sheet that is open where the "
-        "surface is open; both; or none (field and normals only)",
-        choices=("double", "single", "both", "none"),
+        "surface is open; both; the signed surface of a closed shape, with the field negative inside; or none (field "
+        "and normals only)",
+        choices=("double", "single", "both", "signed", "none"),
     )
     solver: str = _option(
         "reflection",
         "How normals are found: by reflections across the Voronoi bisectors, by minimising the published energy on "
         "samples of the bisectors (slower, the reference), or by a plain local plane fit (PCA, the baseline)",
         choices=("reflection", "energy", "pca"),
+    )
+    integration: str = _option(
+        "transport",
+        "How the distance gets from the surface to the rest of the box: carried outwards from the surface's points, or "
+        "by the published Poisson equation (less exact, the reference)",
+        choices=("transport", "poisson"),
     )
     backend: str = _option(
         "auto",
@@ -92,7 +99,7 @@ class Settings:
 
 
 def options() -> dict[str, dataclasses.Field]:
-    """Name -> dataclass field of every setting: `.default`, `.type` and `.metadata` with help, limits, choices, unit."""
+    """Name -> dataclass field of every setting: `.default`, `.type`, `.metadata` (help, limits, choices, word, unit)."""
     return {option.name: option for option in dataclasses.fields(Settings)}
 
 

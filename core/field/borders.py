@@ -100,7 +100,9 @@ def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray
     Returns the distance (m,k) to the patch and the step (m,k,3) that leads out of it (its length is the distance).
     """
     length = np.linalg.norm(lateral, axis=2)
-    open_side = rims.gap[sample] & (np.einsum("mki,mki->mk", lateral, rims.outward[sample]) > length * rims.opening[sample])
+    open_side = rims.gap[sample] & (
+        np.einsum("mki,mki->mk", lateral, rims.outward[sample]) > length * rims.opening[sample]
+    )
     radius = np.where(open_side & rims.bridged[sample], rims.reach[sample], DISC * spacing)
     beyond = np.maximum(length - radius, 0.0)
     step = lateral * (beyond / np.maximum(length, np.finfo(float).tiny))[..., None]

@@ -31,7 +31,7 @@ class DistanceField:
         return values + self.spacing * np.linalg.norm(outside, axis=1)
 
     def gradient(self, x) -> np.ndarray:
-        """Unit-free gradient of :meth:`sample` at `x`, (m,3) -> (m,3) float64, by central differences of half a cell."""
+        """Unit-free gradient of :meth:`sample` at `x`, (m,3) -> (m,3) float64, central differences of half a cell."""
         x = np.asarray(x, np.float64)
         step = 0.5 * self.spacing
         slopes = [(self.sample(x + e) - self.sample(x - e)) / (2 * step) for e in step * np.eye(3)]

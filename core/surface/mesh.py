@@ -19,7 +19,7 @@ class Mesh:
     faces: np.ndarray
 
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
-        """Undirected edges, (e,2) int, and the number of faces at each, (e,) int: 1 at a border, 2 inside a manifold."""
+        """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
         ends = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         return np.unique(ends, axis=0, return_counts=True)
 

@@ -31,7 +31,9 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     for start in np.unique(patch, return_index=True)[1]:
         visited, parent = breadth_first_order(graph, start, directed=False)
         relation = np.asarray(graph[visited[1:], parent[visited[1:]]]).reshape(-1) == 2
-        for face, before, flip in zip(visited[1:].tolist(), parent[visited[1:]].tolist(), relation.tolist(), strict=True):
+        for face, before, flip in zip(
+            visited[1:].tolist(), parent[visited[1:]].tolist(), relation.tolist(), strict=True
+        ):
             turned[face] = turned[before] ^ flip
 
     corners = mesh.vertices[mesh.faces]

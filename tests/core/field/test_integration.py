@@ -144,8 +144,22 @@ class TestAlone:
 
     def test_reports_in_order_and_stops_when_told(self, stage):
         seen = []
-        distance_field(*stage, lambda fraction, _: seen.append(fraction))
+        distance_field(*stage, progress=lambda fraction, _: seen.append(fraction))
         assert seen == sorted(seen)
         assert 0 <= seen[0] <= seen[-1] <= 1
         with pytest.raises(Cancelled):
-            distance_field(*stage, lambda fraction, _: fraction < seen[-1])
+            distance_field(*stage, progress=lambda fraction, _: fraction < seen[-1])
+
+
+@pytest.mark.parametrize("points", [shapes.sphere(800), shapes.hemisphere(800)], ids=["sphere", "hemisphere"])
+def test_poisson_agrees_with_transport(points):
+    """Two routes to the same distance: they part by less than a cell except around the medial axis."""
+    run, other = (
+        reconstruct(points, Settings(resolution=48, surface="none", integration=how))
+        for how in ("transport", "poisson")
+    )
+    apart = np.abs(run.field.values - other.field.values) / run.field.spacing
+    assert 0 < apart.mean() < 0.4
+    assert np.percentile(apart, 95) < 1.0
+    near = run.field.values < run.field.spacing
+    np.testing.assert_array_equal(run.field.values[near], other.field.values[near])

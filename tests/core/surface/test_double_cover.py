@@ -132,7 +132,10 @@ class TestAlone:
     @pytest.fixture
     def stage(self):
         points = shapes.sphere(400)
-        surface, grid = fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0), fit_grid(points, 24)
+        surface, grid = (
+            fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0),
+            fit_grid(points, 24),
+        )
         return distance_field(surface, grid)[0], surface, grid, 1.0
 
     def test_gives_a_triangle_mesh_in_units_of_the_samples(self, stage):
