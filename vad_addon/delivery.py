@@ -15,7 +15,7 @@ _OWN = {"normal", "confidence", "distance", "radius"}  # attributes that results
 
 
 def deliver(scene: bpy.types.Scene, source: Source, outcome: Outcome, keep_both: bool = False) -> bpy.types.Collection:
-    """Put the outcome into a collection "`name` VAD" of `scene`: surface, samples and volume, all or nothing.
+    """Put the outcome into a collection "`name` VAD" of `scene`: meshes, samples and volume, all or nothing.
 
     Where this source has results from an earlier run, these are updated, and the objects keep the materials and the
     modifiers that the user gave them; `keep_both` makes a second collection instead.
@@ -35,10 +35,10 @@ def deliver(scene: bpy.types.Scene, source: Source, outcome: Outcome, keep_both:
             collection = bpy.data.collections.new(f"{source.name} VAD")
             scene.collection.children.link(collection)
         rollback.pop_all()
-    for role in (results.SAMPLES, results.SURFACE, results.FIELD):
+    for role in results.ROLES:
         _place(collection, role, made.get(role), outcome.origin)
     if results.FIELD in made:
-        materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell)
+        materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell, outcome.shape)
     if origin is not None:
         collection[results.SOURCE] = origin
     collection[results.REPORT] = outcome.report
@@ -68,12 +68,11 @@ def _data(source, outcome, warnings, rollback):
             datablocks.pointcloud_data(f"{name} samples", outcome.points, origin, carried | own),
         )
     }
-    if (skin := outcome.surface) is not None:
-        on_skin = {key: attribute[skin.nearest] for key, attribute in carried.items()}
-        on_skin |= dict(distance=Attribute.of(skin.distance), confidence=own["confidence"][skin.nearest])
-        made[results.SURFACE] = keep(
-            datablocks.mesh_data(f"{name} surface", skin.vertices, skin.faces, origin, on_skin)
-        )
+    for role, skin in ((results.SURFACE, outcome.surface), (results.SHEET, outcome.sheet)):
+        if skin is not None:
+            on_skin = {key: attribute[skin.nearest] for key, attribute in carried.items()}
+            on_skin |= dict(distance=Attribute.of(skin.distance), confidence=own["confidence"][skin.nearest])
+            made[role] = keep(datablocks.mesh_data(f"{name} {role}", skin.vertices, skin.faces, origin, on_skin))
     if outcome.volume is not None:
         try:
             path = volume_files.adopt(name, outcome.volume)
@@ -113,4 +112,6 @@ def _summary(outcome):
     yield " × ".join(map(str, outcome.shape)) + " grid"
     if outcome.surface is not None:
         yield f"{len(outcome.surface.faces):,} triangles"
+    if outcome.sheet is not None:
+        yield f"{len(outcome.sheet.faces):,} triangles in the single layer"
     yield f"{outcome.seconds:.1f} s"

@@ -2,13 +2,14 @@
 
 import bpy
 
-from . import extras, importer, operators, overlay, panel, preferences, presets, properties
+from . import cost, extras, importer, operators, overlay, panel, preferences, presets, properties
 
 CLASSES = (
     overlay.VAD_PG_overlay,
     properties.VAD_PG_scene,
     operators.VAD_OT_reconstruct,
     operators.VAD_OT_cancel,
+    cost.VAD_OT_estimate,
     *extras.CLASSES,
     preferences.VAD_OT_clear_cache,
     preferences.VAD_preferences,

@@ -3,14 +3,15 @@
 import bpy
 
 CELL = "vad_cell"  # custom property of a volume: the grid spacing that its densities are made for
+SIZE = "vad_size"  # and the size of its box, (3,)
 _FOG = "vad_fog"  # custom property that tells our materials from the user's
 _OPACITY = 1.5  # optical depth per cell where the fog is densest, in renders; it fades out over two cells
-_FAR = 40.0  # cells at which a slice reaches its last colour
-_NEAR_AND_FAR = (1.0, 0.85, 0.3, 1.0), (0.05, 0.15, 0.5, 1.0)
+_NEAR_AND_FAR = (1.0, 0.45, 0.03, 1.0), (0.01, 0.05, 0.45, 1.0)
+_LINE, _SURFACE = (0.01, 0.01, 0.03, 1.0), (1.0, 1.0, 1.0, 1.0)
 _DISPLAY = 0.5  # the same in the viewport's solid view
 
 
-def fit_fog(volume: bpy.types.Volume, cell: float) -> None:
+def fit_fog(volume: bpy.types.Volume, cell: float, shape: tuple[int, int, int]) -> None:
     """Make the fog of `volume` suit grid cells of this size, in renders and in the viewport.
 
     A volume seen for the first time gets a material. Later only its densities follow the cell, so that whatever the
@@ -26,7 +27,7 @@ def fit_fog(volume: bpy.types.Volume, cell: float) -> None:
             if material is not None and _FOG in material:
                 for node in _principled(material):
                     node.inputs["Density"].default_value *= ratio
-    volume[CELL] = cell
+    volume[CELL], volume[SIZE] = cell, [cell * (nodes - 1) for nodes in shape]
 
 
 def _fog_material(name, cell):
@@ -44,40 +45,44 @@ def _fog_material(name, cell):
     return material
 
 
-def iso_lines(name: str, cell: float) -> bpy.types.Material:
-    """A material that emits a colour for the attribute `distance` and draws a dark line every two cells."""
+def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
+    """A material that emits a colour for the attribute `distance`, from 0 to `far`, with a dark line every two cells
+    and the surface itself in white."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # before Blender 5.0
         material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
 
-    def node(kind, **inputs):
+    def node(kind):
         made = nodes.new(kind)
         made.location.x = 200 * len(nodes)
-        for key, value in inputs.items():
-            made.inputs[int(key[1:])].default_value = value
         return made
 
     def math(operation, source, value):
-        made = node("ShaderNodeMath", _1=value)
-        made.operation = operation
+        made = node("ShaderNodeMath")
+        made.operation, made.inputs[1].default_value = operation, value
         links.new(source, made.inputs[0])
         return made.outputs[0]
 
-    distance = node("ShaderNodeAttribute")
-    distance.attribute_name = "distance"
-    lines = math("DIVIDE", distance.outputs["Fac"], 2 * cell)
-    ramp = node("ShaderNodeValToRGB")
+    def painted(colour, over, where):
+        made = node("ShaderNodeMixRGB")
+        made.inputs[2].default_value = colour
+        links.new(where, made.inputs[0])
+        links.new(over, made.inputs[1])
+        return made.outputs[0]
+
+    attribute, ramp = node("ShaderNodeAttribute"), node("ShaderNodeValToRGB")
+    attribute.attribute_name = "distance"
+    distance = attribute.outputs["Fac"]
     for element, colour in zip(ramp.color_ramp.elements, _NEAR_AND_FAR, strict=True):
         element.color = colour
-    links.new(math("DIVIDE", distance.outputs["Fac"], _FAR * cell), ramp.inputs["Fac"])
-    line = math("LESS_THAN", math("FRACT", lines, 0.0), 0.12)
-    mix = node("ShaderNodeMixRGB", _2=(0.02, 0.02, 0.05, 1.0))
-    links.new(line, mix.inputs[0])
-    links.new(ramp.outputs["Color"], mix.inputs[1])
+    links.new(math("DIVIDE", distance, far), ramp.inputs["Fac"])
+    line = math("LESS_THAN", math("FRACT", math("DIVIDE", distance, 2 * cell), 0.0), 0.12)
+    colour = painted(_LINE, over=ramp.outputs["Color"], where=line)
+    colour = painted(_SURFACE, over=colour, where=math("LESS_THAN", distance, 0.6 * cell))
     emission, output = node("ShaderNodeEmission"), node("ShaderNodeOutputMaterial")
-    links.new(mix.outputs[0], emission.inputs["Color"])
+    links.new(colour, emission.inputs["Color"])
     links.new(emission.outputs[0], output.inputs["Surface"])
     return material
 

@@ -46,7 +46,7 @@ class VAD_OT_reconstruct(bpy.types.Operator):
             return self.execute(context)
         try:
             self._gather(context)
-            job.start(self._task, Path(bpy.app.tempdir))
+            self._job = job.start(self._task, Path(bpy.app.tempdir))
         except VADError as error:
             return self._fail(error)
         self._scene = context.scene.session_uid
@@ -55,8 +55,8 @@ class VAD_OT_reconstruct(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        running = job.running()
-        if running is None:  # stopped from elsewhere: the Cancel button
+        running = self._job
+        if job.running() is not running:  # stopped from elsewhere: the Cancel button
             return self._cancelled(context)
         if event.type == "ESC" and event.value == "PRESS":
             return self._cancelled(context)
@@ -76,7 +76,8 @@ class VAD_OT_reconstruct(bpy.types.Operator):
 
     def cancel(self, context):
         """Blender ends the operator: the file is closed, another one loads, or the window goes."""
-        stop_run()
+        if job.running() is self._job:
+            stop_run()
 
     def _gather(self, context):
         options = chosen(context.scene.vad, self.properties)
@@ -102,7 +103,8 @@ class VAD_OT_reconstruct(bpy.types.Operator):
         return {"CANCELLED"}
 
     def _end(self, context):
-        job.stop()
+        if job.running() is self._job:
+            job.stop()
         context.window_manager.event_timer_remove(self._timer)
         status.clear()
 

@@ -49,11 +49,15 @@ class Skin:
     distance: np.ndarray
 
 
+_SKINS = "surface", "sheet"
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What a run found, in input units; see :class:`core.Reconstruction` for points, source_index, normals, confidence.
 
-    surface  : Skin of the double cover, or None
+    surface  : Skin of the double cover or of the signed surface, or None
+    sheet    : Skin of the single layer, or None
     volume   : .vdb file of the field, relative to `origin`, or None; it belongs to whoever takes the outcome
     origin   : (3,) float64, centre of the samples, exact in single precision
     cell     : float, spacing of the field's grid
@@ -68,6 +72,7 @@ class Outcome:
     normals: np.ndarray
     confidence: np.ndarray
     surface: Skin | None
+    sheet: Skin | None
     volume: Path | None
     origin: np.ndarray
     cell: float
@@ -78,8 +83,9 @@ class Outcome:
 
     def save(self, path: Path) -> None:
         arrays = {name: getattr(self, name) for name in ("points", "source_index", "normals", "confidence", "origin")}
-        if self.surface is not None:
-            arrays |= {f"surface.{name}": array for name, array in vars(self.surface).items()}
+        for skin in _SKINS:
+            if (found := getattr(self, skin)) is not None:
+                arrays |= {f"{skin}.{name}": array for name, array in vars(found).items()}
         facts = {name: getattr(self, name) for name in ("cell", "shape", "report", "warnings", "seconds")}
         facts["volume"] = self.volume and str(self.volume)
         np.savez(path, **arrays, facts=json.dumps(facts))
@@ -94,8 +100,11 @@ class Outcome:
             warnings=tuple(facts["warnings"]),
             volume=Path(facts["volume"]) if facts["volume"] else None,
         )
-        skin = {name: arrays.pop(f"surface.{name}") for name in Skin.__annotations__ if f"surface.{name}" in arrays}
-        return cls(**arrays, **facts, surface=Skin(**skin) if skin else None)
+        for skin in _SKINS:
+            names = [name for name in arrays if name.startswith(f"{skin}.")]
+            found = {name.partition(".")[2]: arrays.pop(name) for name in names}
+            facts[skin] = Skin(**found) if found else None
+        return cls(**arrays, **facts)
 
 
 def compute(task: Task, folder: Path, progress=None) -> Outcome:
@@ -129,6 +138,7 @@ def _compute(task, folder, progress):
         normals=result.normals,
         confidence=result.confidence,
         surface=result.surface and _skin(result.surface, result),
+        sheet=result.sheet and _skin(result.sheet, result),
         volume=volume,
         origin=origin,
         cell=result.field.spacing,

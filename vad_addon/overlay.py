@@ -89,10 +89,7 @@ def sync() -> None:
         bpy.app.handlers.depsgraph_update_post.append(_geometry_changed)
     elif not wanted:
         remove()
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    _redraw()
 
 
 def remove() -> None:
@@ -103,6 +100,14 @@ def remove() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
         bpy.app.handlers.depsgraph_update_post.remove(_geometry_changed)
         _handle = None
+        _redraw()
+
+
+def _redraw():
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
 
 
 @persistent

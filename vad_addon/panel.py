@@ -4,6 +4,7 @@ import bpy
 
 from ..core.settings import options
 from . import extras, job, results, shapes, status
+from .cost import VAD_OT_estimate
 from .message import draw_message
 from .operators import VAD_OT_cancel, VAD_OT_reconstruct
 from .points_in import point_count, selection_problem, sources
@@ -40,6 +41,7 @@ class VAD_PT_reconstruct(_Sidebar, bpy.types.Panel):
         again = results.previous(context.scene, objects[0]) if objects else None
         _settings_column(layout, stored, [*extra, *MAIN_SETTINGS, *(["keep_both"] if again else [])])
         layout.operator(VAD_OT_reconstruct.bl_idname, icon="OUTLINER_OB_MESH")
+        layout.operator(VAD_OT_estimate.bl_idname, icon="QUESTION")
 
 
 class VAD_PT_more_settings(_Sidebar, bpy.types.Panel):

@@ -33,10 +33,14 @@ class Source:
 
 
 def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The objects to reconstruct: the active one first, then the others selected. Where these are results of earlier
-    runs only, what the active one was made from, so that a run can be repeated with its results at hand."""
-    active = context.active_object
-    chosen = ([active] if active else []) + [obj for obj in context.selected_objects if obj != active]
+    """The objects to reconstruct: those selected, the active one first; the active one alone where it is not selected.
+    Where these are results of earlier runs only, what the active one was made from, so that a run can be repeated with
+    its results at hand."""
+    active, chosen = context.active_object, list(context.selected_objects)
+    if active in chosen:
+        chosen.sort(key=lambda obj: obj != active)
+    elif active is not None:
+        chosen = [active]
     if scans := [obj for obj in chosen if obj.type in READABLE and results.role(obj) is None]:
         return scans
     origins = [results.origin(obj, context.scene) or obj for obj in chosen[:1]]

@@ -27,19 +27,22 @@ def settings_properties(**keywords) -> dict:
     return {name: setting_property(option, **keywords) for name, option in options().items()}
 
 
-def settings_from(stored, override) -> Settings:
+def settings_from(stored, override=None) -> Settings:
     """Settings held by `stored` (a :class:`VAD_PG_scene`), except those that were set explicitly in `override`
     (an operator's ``properties``). Raises :class:`SettingsError`."""
     return Settings(**{name: _exact(value) for name, value in _merged(options(), stored, override).items()})
 
 
-def chosen(stored, override) -> dict[str, bool]:
+def chosen(stored, override=None) -> dict[str, bool]:
     """The options of a run that are no settings of the method, by the same rule."""
     return _merged(RUN_OPTIONS, stored, override)
 
 
 def _merged(names, stored, override):
-    return {name: getattr(override if override.is_property_set(name) else stored, name) for name in names}
+    def holder(name):
+        return override if override is not None and override.is_property_set(name) else stored
+
+    return {name: getattr(holder(name), name) for name in names}
 
 
 def setting_property(option, **keywords):

@@ -3,7 +3,7 @@
 import bpy
 
 ROLE = "vad_role"  # of an object
-SAMPLES, SURFACE, FIELD = "samples", "surface", "field"
+SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 SOURCE, REPORT, SUMMARY, WARNINGS = "vad_source", "vad_report", "vad_summary", "vad_warnings"  # of a collection
 
 

@@ -17,7 +17,7 @@ def shell(collection: bpy.types.Collection, offset: float) -> bpy.types.Object:
     obj = _object(f"{field.name} shell", bpy.data.meshes.new(f"{field.name} shell"), SHELL, collection, field)
     modifier = obj.modifiers.new("Volume to Mesh", "VOLUME_TO_MESH")
     modifier.object = field
-    modifier.grid_name = "udf"
+    modifier.grid_name = _distances(field)
     modifier.resolution_mode = "GRID"
     modifier.threshold = offset * field.data[materials.CELL]
     modifier.use_smooth_shade = True
@@ -28,12 +28,11 @@ def cut(collection: bpy.types.Collection, axis: int) -> bpy.types.Object:
     """A plane through the middle of the volume, across `axis` (0, 1 or 2), that shows the distances where it lies, with
     colours and iso-lines, wherever it is moved. Raises :class:`InputError` without a volume."""
     field = _field(collection)
-    low, high = (np.array(corner) for corner in (field.bound_box[0], field.bound_box[6]))
-    obj = _object(f"{field.name} slice", _plane(high - low, axis), SLICE, collection, field)
-    obj.location = 0.5 * (low + high)
+    size = np.array(field.data[materials.SIZE])
+    obj = _object(f"{field.name} slice", _plane(size, axis), SLICE, collection, field)
     modifier = obj.modifiers.new("Slice", "NODES")
     modifier.node_group = _slice_nodes(field)
-    obj.data.materials.append(materials.iso_lines(obj.name, field.data[materials.CELL]))
+    obj.data.materials.append(materials.iso_lines(obj.name, field.data[materials.CELL], 0.25 * size.max()))
     return obj
 
 
@@ -60,6 +59,12 @@ def _field(collection):
     if field is None:
         raise InputError(f"{collection.name} has no volume: reconstruct again")
     return field
+
+
+def _distances(field):
+    """Name of the grid of distances, which says whether they are signed."""
+    field.data.grids.load()
+    return next(grid.name for grid in field.data.grids if grid.name in {"udf", "sdf"})
 
 
 def _object(name, data, role, collection, parent):
@@ -102,7 +107,7 @@ def _slice_nodes(field):
         node.location.x = 200 * place
     volume.transform_space = "RELATIVE"
     volume.inputs["Object"].default_value = field
-    grid.inputs["Name"].default_value = "udf"
+    grid.inputs["Name"].default_value = _distances(field)
     store.inputs["Name"].default_value = "distance"
     link = group.links.new
     link(volume.outputs["Geometry"], grid.inputs["Volume"])

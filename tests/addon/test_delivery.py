@@ -122,6 +122,30 @@ def test_a_surface_no_longer_asked_for_goes(run, scan):
     assert set(run()) == {"samples", "surface", "field"}
 
 
+@pytest.mark.parametrize(
+    ("asked", "made"),
+    [
+        ("single", {"samples", "sheet", "field"}),
+        ("both", {"samples", "surface", "sheet", "field"}),
+        ("signed", {"samples", "surface", "field"}),
+    ],
+)
+def test_the_meshes_are_those_asked_for(blender, run, scan, asked, made):
+    found = run(surface=asked)
+    assert set(found) == made
+    for role in made & {"surface", "sheet"}:
+        assert {"distance", "confidence", "Col"} <= set(found[role].data.attributes.keys())
+    blender.ops.vad.shell(offset=2)
+    _, mesh = evaluated(blender, blender.context.active_object)
+    assert len(mesh.polygons) > 100
+
+
+def evaluated(bpy, obj):
+    bpy.context.view_layer.update()
+    final = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return final, final.to_mesh()
+
+
 def test_results_being_edited_stay_as_they_are(blender, run, scan, extension):
     first = run()
     vertices = len(first["surface"].data.vertices)

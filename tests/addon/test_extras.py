@@ -29,9 +29,6 @@ def evaluated(bpy, obj):
     return points @ matrix[:3, :3].T + matrix[:3, 3], mesh
 
 
-CELL = 2 / 32 * 1.1  # about: the box is padded
-
-
 @pytest.mark.parametrize("operator", ["shell", "slice", "normals_to_geometry"])
 def test_without_results_there_is_nothing_to_look_at(blender, operator):
     with pytest.raises(RuntimeError, match="There are no results yet: reconstruct first"):
@@ -49,19 +46,18 @@ def test_a_shell_lies_at_its_distance_on_both_sides(blender, result):
     assert blender.ops.vad.shell(offset=3) == {"FINISHED"}
     shell = blender.context.active_object
     cell = result["field"].data["vad_cell"]
+    near = 0.6 * cell if blender.app.version >= (5, 0, 0) else cell  # before, Blender lays the mesh half a cell off
     for distance in (3 * cell, 2 * cell):
         shell.modifiers[0].threshold = distance
         points, mesh = evaluated(blender, shell)
         radius = np.linalg.norm(points, axis=1)
-        assert_allclose(np.abs(radius - 1), distance, atol=0.6 * cell)
+        assert_allclose(np.abs(radius - 1), distance, atol=near)
         assert (radius > 1).any()
         assert (radius < 1).any()
         assert len(mesh.polygons) > 100
 
 
 def test_a_slice_shows_the_distance_where_it_lies(blender, result):
-    if blender.app.version < (5, 0, 0):
-        pytest.skip("Sample Grid is new in 5.0")
     blender.ops.vad.slice(axis="Z")
     plane = blender.context.active_object
     cell = result["field"].data["vad_cell"]

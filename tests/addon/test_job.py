@@ -57,12 +57,12 @@ def ended(job):
 
 def under_way(job):
     assert not job.poll()
-    return job.stage == "points"
+    return job.stage != "starting"
 
 
 def test_a_job_finds_what_the_core_finds(extension, start, task, sphere, tmp_path):
     axes = (np.array([3, 70]), np.array([[0.0, 0, 1], [1, 0, 0]]))
-    given = extension("vad_addon.outcome").Task(sphere, task(sphere).settings, axes)
+    given = extension("vad_addon.outcome").Task(sphere, task(sphere, surface="both").settings, axes)
     job = start(given)
     heard = []
     wait(job, lambda job: (job.poll(), heard.append((job.fraction, job.stage)))[0])
@@ -72,8 +72,9 @@ def test_a_job_finds_what_the_core_finds(extension, start, task, sphere, tmp_pat
 
     for name in ("points", "source_index", "normals", "confidence", "origin"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
-    for name, array in vars(expected.surface).items():
-        np.testing.assert_array_equal(getattr(found.surface, name), array)
+    for mesh in ("surface", "sheet"):
+        for name, array in vars(getattr(expected, mesh)).items():
+            np.testing.assert_array_equal(getattr(getattr(found, mesh), name), array)
     assert (found.cell, found.shape, found.warnings) == (expected.cell, expected.shape, ())
     assert found.volume.stat().st_size == expected.volume.stat().st_size
     np.testing.assert_allclose(np.abs(found.normals[[3, 70]]), axes[1], atol=1e-12)

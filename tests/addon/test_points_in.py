@@ -151,6 +151,14 @@ def test_selected_objects_are_joined_the_active_one_first(blender, gather, add_m
     assert len(gather().points) == 500
 
 
+def test_an_active_object_that_is_not_selected_stands_alone(gather, add_mesh, sphere):
+    add_mesh("Cube", sphere[:8])
+    scan = add_mesh("Scan", sphere)
+    scan.select_set(False)
+    found = gather()
+    assert (found.uid, len(found.points)) == (scan.session_uid, 500)
+
+
 def test_a_selected_camera_does_not_matter(blender, gather, add, add_mesh, sphere):
     scan = add_mesh("Scan", sphere)
     add("Eye", blender.data.cameras.new("Eye"))
