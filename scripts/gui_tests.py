@@ -3,8 +3,9 @@
     python scripts/gui_tests.py                          in a folder with Debian's Blender, built when first needed
     python scripts/gui_tests.py --blender /path/blender  in this Blender; on Linux without a display it needs Xvfb
 
-The Debian folder ($XDG_CACHE_HOME/vad-gui, 1.5 GB, needs root and a Debian mirror) is kept and used again. Where it
-cannot be built the tests are skipped and the last lines say so. Arguments name the cases to run; default: all.
+The Debian folder ($XDG_CACHE_HOME/vad-gui, 1.5 GB, needs root, comes from the mirror of this machine's apt) is kept
+and used again. Where it cannot be built the tests are skipped and the last lines say so. Arguments name the cases to
+run; default: all.
 """
 
 import argparse
@@ -19,7 +20,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CASES = ROOT / "tests" / "gui"
-MIRROR = "http://deb.debian.org/debian"
 PACKAGES = [
     *("blender", "xvfb", "imagemagick"),
     *("libegl-mesa0", "libegl1", "libgl1-mesa-dri", "libglx-mesa0"),
@@ -39,7 +39,8 @@ def main():
     try:
         machine = Host(arguments.blender) if arguments.blender else Debian(_debian_folder())
         with machine.display() as display:
-            failed = [name for name in arguments.cases or _cases() if not _run(machine, display, name, arguments.zip)]
+            cases = arguments.cases or _cases()
+            failed = [name for name in cases if not _passes(machine, display, name, arguments.zip)]
     except Unavailable as reason:
         print("\n" + "=" * 100)
         print(f"GUI TESTS SKIPPED, NOTHING WAS TESTED IN A WINDOW: {reason}")
@@ -62,6 +63,11 @@ def _arguments():
 
 def _cases():
     return sorted(path.stem.removeprefix("case_") for path in CASES.glob("case_*.py"))
+
+
+def _passes(machine, display, name, archive):
+    """Whether a case passes, at the second try if not at the first: a busy machine may miss a click."""
+    return any(_run(machine, display, name, archive) for _ in range(2))
 
 
 def _run(machine, display, name, archive):
@@ -220,6 +226,16 @@ def _debian_folder():
     return root
 
 
+def _mirror():
+    """Where this machine's apt has Debian's packages from. Raises :class:`Unavailable`."""
+    command = ["apt-get", "indextargets", "--format", "$(REPO_URI) $(RELEASE)", "Created-By: Packages"]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    releases = [line.split() for line in lines if "-" not in line.split()[1]]
+    if not releases:
+        raise Unavailable("apt names no mirror of Debian")
+    return releases[0][0]
+
+
 def _build_debian(root, folder):
     def run(*command, check=True, **keywords):
         output = dict(stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -232,7 +248,7 @@ def _build_debian(root, folder):
         run("dpkg-deb", "-x", str(package), str(folder / "tool"))
         debootstrap = folder / "tool/usr/sbin/debootstrap"
         environment["DEBOOTSTRAP_DIR"] = str(folder / "tool/usr/share/debootstrap")
-    run(str(debootstrap), "--no-check-gpg", "--variant=minbase", "sid", str(root), MIRROR, env=environment)
+    run(str(debootstrap), "--no-check-gpg", "--variant=minbase", "sid", str(root), _mirror(), env=environment)
     run("chroot", str(root), "apt-get", "update", check=False)  # a wrong clock is no reason to stop
     install = ["apt-get", "install", "-y", "--no-install-recommends", *PACKAGES]
     run("chroot", str(root), "env", "DEBIAN_FRONTEND=noninteractive", *install)
