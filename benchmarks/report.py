@@ -52,6 +52,17 @@ TOPOLOGY = [
     Column("least angle", "mesh.min_angle", "{:.1f}°", 60.0),
     Column("no area", "mesh.zero_area", "{:.3%}"),
 ]
+SHEET = [
+    Column("CD", "sheet.cd"),
+    Column("HD", "sheet.hd", "{:.1f}"),
+    Column("to truth", "sheet.to_truth_mean sheet.to_truth_max", "{:.3f} / {:.1f}", None),
+    Column("to mesh", "sheet.to_mesh_mean sheet.to_mesh_max", "{:.3f} / {:.1f}", None),
+    Column("F@.005", "sheet.f005", "{:.4f}", 1.0),
+    Column("pieces", "sheet.components", "{}", None),
+    Column("Euler (true)", "sheet.euler sheet.euler_expected", "{} ({})", None),
+    Column("border loops (true)", "sheet.loops sheet.loops_expected", "{} ({})", None),
+    Column("edges of 3+ faces", "sheet.nonmanifold_edges", "{}", None),
+]
 NORMALS = [
     Column("NC", "normals.nc", "{:.4f}", 1.0),
     Column("NC 5 %", "normals.nc_p05", "{:.4f}", 1.0),
@@ -66,8 +77,17 @@ FIELD = [
     Column("above", "field.above_share field.above_max", "{:.2%}, {:.2f}"),
     *(_rim(cells) for cells in (4, 8, 16)),
 ]
+INTEGRATION = [
+    Column("box: transport", "field.box", goal=None),
+    Column("Poisson", "poisson.box", goal=None),
+    Column("near: transport", "field.near", goal=None),
+    Column("Poisson", "poisson.near", goal=None),
+    Column("eikonal: transport", "field.eikonal", "{:.4f}", None),
+    Column("Poisson", "poisson.eikonal", "{:.4f}", None),
+]
 COST = [
     Column("points", "share.points", "{:.0%}", None),
+    Column("cleaning", "share.cleaning", "{:.0%}", None),
     Column("normals", "share.normals", "{:.0%}", None),
     Column("field", "share.field", "{:.0%}", None),
     Column("surface", "share.surface", "{:.0%}", None),
@@ -85,10 +105,12 @@ PEER = [
     Column("ours", "normals.nc", "{:.4f}", None),
 ]
 TABLES = {
-    "Surface": SURFACE,
-    "Mesh": TOPOLOGY,
+    "Double cover": SURFACE,
+    "Double cover, mesh": TOPOLOGY,
+    "Single layer": SHEET,
     "Normals": NORMALS,
     "Field": FIELD,
+    "Integration": INTEGRATION,
     "Cost": COST,
     "Against the peer": PEER,
 }

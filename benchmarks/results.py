@@ -30,11 +30,13 @@ in CPU time mostly by less than a third, so only the latter are worth comparing.
 - **Surface**: 200 000 area-uniform, seeded points on either mesh, exact distance to the triangles of the other
   (libigl). *to truth* (what is too much) and *to mesh* (what is missing): mean / maximum. *CD* is the mean of the two
   means, *HD* the larger maximum, *F@t* the harmonic mean of the shares closer than t (in the scale of the case).
-- **Mesh**: the double cover is to be closed, so every edge should have two faces. Its Euler number should be twice that
+- **Double cover, mesh**: it is to be closed, so every edge should have two faces. Its Euler number should be twice that
   of the true surface, borders and junctions included; no expectation is given where sheets cross and the true mesh
   has no edge there. Sheets closer than about two cells cannot be told apart, so those cases miss it for that reason
   too (petals_10k: neighbouring petals come within 0.3 cell). *least angle*: mean of the triangles' smallest angles;
   *no area*: share of faces below a millionth of the mean area.
+- **Single layer**: errors as above; Euler number and border loops beside those of the true mesh (which shows junctions
+  as it happens to be modelled). Where sheets meet, edges of three and more faces belong there.
 - **Normals**: |n·n\\*| at the input points: mean, 5th percentile, and mean within 0.05 of curves where sheets
   meet or cross.
 - **Field**, on 20 000 seeded points each: mean |u − d| over the *box* and within 0.05 of the surface (*near*), d the
@@ -45,6 +47,7 @@ in CPU time mostly by less than a third, so only the latter are worth comparing.
   trilinear reading of exact nodes alone gives 0.33. *above*: share of nodes where u exceeds the distance to the
   nearest sample, and by how many cells at most; it never should. *u/d 4, 8, 16*: u over the exact distance at so many
   cells past an open rim: mean (5th to 95th percentile), 1 is perfect, below 1 means that the sheet leaks past its end.
+- **Integration**: the same errors with the paper's Poisson equation in place of the default.
 - **Cost**: share of the time of each stage; peak memory of the process (each case has its own, Python and libraries
   included); time over that of *Poisson*: Open3D's PCA normals (30 neighbours), orientation along tangent planes (15)
   and Poisson reconstruction at depth 8, by the clock and in CPU time, which feels other work on the machine less; and

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -43,6 +44,16 @@ def run_case(path: Path, sampling: str, settings: Settings, with_peers: bool) ->
     }
     if result.surface is not None:
         measured["mesh"] = _measure_mesh(result.surface, case)
+    sheet = reconstruct(case.points, replace(settings, surface="single")).sheet
+    measured["sheet"] = {
+        **surface_errors(sheet, case.truth),
+        **topology(sheet),
+        "loops": sheet.border_loops(),
+        "euler_expected": topology(case.truth)["euler"],
+        "loops_expected": case.truth.border_loops(),
+    }
+    poisson = reconstruct(case.points, replace(settings, surface="none", integration="poisson")).field
+    measured["poisson"] = field_errors(poisson, case.truth, result.points)
     if with_peers:
         measured["peer"] = _measure_peers(case, measured["seconds"])
     return measured

@@ -65,7 +65,7 @@ def test_the_page_is_made_of_the_runs(saved, tmp_path, monkeypatch):
     run = json.loads(saved[0].read_text())
     monkeypatch.setattr("benchmarks.results.DOCS", tmp_path)
     text = write_results({"uniform": run, "blue noise": run}).read_text()
-    assert text.count("| ball |") == 1 + 2 * 5
+    assert text.count("| ball |") == 1 + 2 * 7
     assert "bridge 3.5" in text
     assert json.loads((tmp_path / "results" / "blue_noise.json").read_text()) == run
 

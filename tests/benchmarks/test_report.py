@@ -27,7 +27,7 @@ def test_a_table_has_a_row_a_case_and_the_medians():
 def test_tables_without_values_are_left_out():
     text = markdown_tables([{"case": "a", "normals": {"nc": 0.5}}])
     assert "## Normals" in text
-    assert "## Surface" not in text
+    assert "## Double cover" not in text
 
 
 def test_failed_cases_stay_visible():
@@ -41,7 +41,7 @@ def test_failed_cases_stay_visible():
 def test_comparison_knows_which_way_is_better():
     lines = list(comparison(run(result(cd=1.0, nc=0.9)), run(result(cd=1.5, nc=0.95))))
     assert [line.split() for line in lines] == [
-        ["a", "Surface", "CD", "1.000", "->", "1.500", "worse", "(+50%", "to", "go)"],
+        ["a", "Double", "cover", "CD", "1.000", "->", "1.500", "worse", "(+50%", "to", "go)"],
         ["a", "Normals", "NC", "0.9000", "->", "0.9500", "better", "(-50%", "to", "go)"],
         ["1", "better,", "1", "worse"],
     ]
