@@ -4,6 +4,7 @@ import argparse
 import signal
 import sys
 from contextlib import contextmanager
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -11,9 +12,11 @@ import numpy as np
 from scipy.spatial import KDTree
 from tqdm import tqdm
 
-from .errors import Cancelled, MissingDependency, SettingsError, VADError
+from .budget import estimate_cost
+from .errors import Cancelled, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .field.grid import fit_grid
 from .io.atomic import writable_folder
+from .io.npz import write_arrays
 from .io.ply import write_mesh, write_points
 from .io.points import READERS, read_points
 from .io.report import report_json, write_report
@@ -25,7 +28,7 @@ from .settings import Settings, options
 
 PROGRAM = "python -m core"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
-DONE, BAD_INPUT, CANCELLED = 0, 2, 130
+DONE, BAD_INPUT, TOO_LARGE, CANCELLED = 0, 2, 3, 130
 
 _DESCRIPTION = "Reconstruct a surface from a point cloud without normals: distance field, mesh and normals."
 _EXAMPLE = f"""\
@@ -36,6 +39,7 @@ example:
 exit status:
   0    done
   2    the scan, an option or the output folder cannot be used: one line on stderr says what and how to help it
+  3    the run would need more memory than it may have: the line names a resolution that fits
   130  cancelled by Ctrl-C; no file is left half-written
 
 With --json, stdout holds one JSON document and nothing else: the report, or {{"error": "..."}} beside the line on
@@ -43,10 +47,14 @@ stderr.
 """
 _OUTPUTS = """\
 files in the folder OUT, named after the scan, each written whole or not at all:
-  SCAN.vdb         OpenVDB grids: udf (distance to the surface) and density (fog to look at)
+  SCAN.vdb         OpenVDB grids: udf (distance to the surface; sdf where signed) and density (fog to look at)
   SCAN_double.ply  mesh: the closed two-sided cover of the surface (with --surface double or both)
   SCAN_single.ply  mesh: one layer, open where the surface is (with --surface single or both)
+  SCAN_signed.ply  mesh: the boundary of a closed shape's inside (with --surface signed)
   SCAN_points.ply  the samples used, with normals (unit axes, the sign is arbitrary) and confidence
+  SCAN.npz         NumPy arrays for other programs, with --arrays (numpy.load): values, origin, spacing, signed (the
+                   field), gradient (at every node); for the nodes near the surface node (i,j,k), direction (unit, away
+                   from the surface) and foot (the nearest point of the surface)
   SCAN.json        settings, counts, seconds, warnings; written last
 All are in the scan's own units and place.
 """
@@ -61,6 +69,8 @@ def main(arguments: list[str] | None = None) -> int:
         return DONE
     except Cancelled as error:
         return _fail(error, CANCELLED, arguments)
+    except MemoryBudgetError as error:
+        return _fail(error, TOO_LARGE, arguments)
     except VADError as error:
         return _fail(error, BAD_INPUT, arguments)
     except KeyboardInterrupt:
@@ -98,6 +108,7 @@ def _parser():
     command.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="folder for the results")
     _add_settings(command, options())
     command.add_argument("--gradient", action="store_true", help="also write the grid gradient into SCAN.vdb")
+    command.add_argument("--arrays", action="store_true", help="also write SCAN.npz for other programs")
     command.add_argument("--json", action="store_true", help="print the report and the files written as JSON")
     command.set_defaults(run=_reconstruct)
 
@@ -148,7 +159,7 @@ def _reconstruct(given):
     folder = writable_folder(given.output)
     with _progress() as progress:
         result = reconstruct(points, settings, progress=progress)
-    report = _write(result, folder, given.scan, given.gradient)
+    report = _write(result, folder, given.scan, given.gradient, given.arrays)
     for warning in report["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
     print(report_json(report) if given.json else _summary(report))
@@ -180,16 +191,19 @@ def _progress():
         signal.signal(signal.SIGINT, previous)
 
 
-def _write(result: Reconstruction, folder, scan, gradient):
+def _write(result: Reconstruction, folder, scan, gradient, arrays):
     """Write every file; the report, which lists them, goes last. Returns the report."""
     samples = dict(points=result.points, normals=result.normals, confidence=result.confidence)
     writers = {
         "_points.ply": partial(write_points, **samples),
         ".vdb": partial(write_vdb, field=result.field, gradient=gradient),
     }
-    for ending, mesh in (("_double.ply", result.surface), ("_single.ply", result.sheet)):
+    closed = "_signed.ply" if result.field.sdf else "_double.ply"
+    for ending, mesh in ((closed, result.surface), ("_single.ply", result.sheet)):
         if mesh is not None:
             writers[ending] = partial(write_mesh, mesh=mesh)
+    if arrays:
+        writers[".npz"] = partial(write_arrays, result=result)
 
     summary = folder / f"{scan.stem}.json"
     report = {**result.report, "scan": scan, "files": [], "warnings": list(result.report["warnings"])}
@@ -224,6 +238,7 @@ def _info(given):
     finite = int(np.isfinite(points).all(axis=1).sum())
     low, high = used.min(axis=0), used.max(axis=0)
     grid = fit_grid(used, resolution)
+    spacing = local_spacing(samples.points) * samples.scale
     facts = {
         "scan": given.scan,
         "points": len(points),
@@ -231,9 +246,10 @@ def _info(given):
         "duplicates": finite - len(used),
         "box": {"low": low, "high": high, "size": high - low},
         "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
-        "spacing": np.median(local_spacing(samples.points)) * samples.scale,
+        "spacing": np.median(spacing),
         "resolution": resolution,
         "grid": {"shape": grid.shape, "cell": grid.spacing},
+        "estimate": asdict(estimate_cost(spacing, grid)),
     }
     print(report_json(facts) if given.json else _described(facts))
 
@@ -247,5 +263,6 @@ def _described(facts):
         f"box      {low} to {high}, size {size}\n"
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"
-        f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes"
+        f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes\n"
+        f"run      about {facts['estimate']['seconds']:.0f} s and {facts['estimate']['memory_mb']:.0f} MiB"
     )

@@ -22,3 +22,7 @@ class MissingDependency(VADError, ImportError):
 
 class Cancelled(VADError):
     """The caller's progress callback returned False; nothing was written."""
+
+
+class MemoryBudgetError(VADError, MemoryError):
+    """A run that would need more memory than it may have; nothing was started."""

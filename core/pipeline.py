@@ -5,10 +5,11 @@ from dataclasses import asdict
 
 import numpy as np
 
+from .budget import check_budget, estimate_cost
 from .cleaning.clean import clean
 from .field.distance_field import DistanceField
 from .field.grid import fit_grid
-from .field.integration import distance_field
+from .field.integration import NearBand, distance_field
 from .field.local_surface import fit_local_surface
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
@@ -16,8 +17,10 @@ from .points import local_spacing, prepare_samples
 from .progress import Progress
 from .reconstruction import Reconstruction
 from .settings import Settings
+from .surface.crossings import find_crossings
 from .surface.double_cover import double_cover
 from .surface.mesh import Mesh
+from .surface.sides import find_sides
 from .surface.signed import signed_distance, signed_mesh
 from .surface.single_layer import single_layer
 
@@ -39,9 +42,9 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
     >>> abs(result.field.sample([[0, 0, 1.5]])[0] - 0.5) < 0.01
     True
 
-    Raises :class:`InputError` for points or constraints that cannot be used and for signed distance of a shape that is
-    not closed, :class:`MissingDependency` where no
-    library that extracts iso-surfaces is found, :class:`Cancelled` where `progress` says so.
+    Raises :class:`InputError` for points or constraints that cannot be used and for the signed surface of a shape that is
+    not closed, :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled`
+    where `progress` says so.
     """
     progress, stages = Progress.of(progress), _Stages()
 
@@ -53,6 +56,8 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         constraints = checked_constraints(constraints, samples.source_index)
         spacing = local_spacing(samples.points)
         grid = fit_grid(samples.points, settings.resolution)
+        estimate = estimate_cost(spacing, grid)
+        check_budget(estimate, len(spacing), grid, settings)
 
     with stages("normals"):
         normals, confidence, counts = estimate_normals(
@@ -68,22 +73,30 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
     unoriented = 0
     with stages("surface"):
         if settings.surface in ("double", "both"):
-            surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 0.9, "double cover"))
+            surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 0.85, "double cover"))
             surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
-        if signed:
-            part = progress.part(0.8, 0.9, "sides")
-            values = signed_distance(values, band, local, grid, samples.to_input_units, part)
-            surface = signed_mesh(values, local, grid, progress.part(0.9, 1.0, "signed surface"))
-            surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
+        if settings.surface in ("single", "both", "signed"):
+            crossings = find_crossings(band, local, grid, progress.part(0.85, 0.92, "crossings"))
+            sides = find_sides(values, crossings, local, grid)
         if settings.surface in ("single", "both"):
-            sheet, unoriented = single_layer(band, local, grid, progress.part(0.9, 1.0, "single layer"))
+            part = progress.part(0.92, 1.0, "single layer")
+            sheet, unoriented = single_layer(values, crossings, sides, local, grid, part)
             sheet = Mesh(samples.to_input_units(sheet.vertices), sheet.faces)
+        if signed:
+            values = signed_distance(values, sides, local, samples.to_input_units)
+            surface = signed_mesh(values, local, grid, progress.part(0.92, 1.0, "signed surface"))
+            surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
 
     warnings = list(samples.warnings)
     if unoriented:
         warnings.append(
             f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided there, "
             "or sheets meet; use the double cover where both sides must show"
+        )
+    if signed and not sides.complete:
+        warnings.append(
+            f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls) and is not in the "
+            f"signed surface, which spans openings of {sides.spanned:.1%} of its area; compare it with the single layer"
         )
     report = {
         "settings": asdict(settings),
@@ -104,6 +117,7 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
         "spacing": float(np.median(spacing)) * samples.scale,
         "seconds": stages.seconds,
+        "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
         "warnings": warnings,
     }
@@ -121,6 +135,7 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         ),
         surface=surface,
         sheet=sheet,
+        near=NearBand(band.node, band.step * samples.scale),
         report=report,
     )
 

@@ -10,6 +10,7 @@ from .errors import InputError
 MINIMUM_SAMPLES = 4
 SPACING_NEIGHBOURS = 6
 _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
+_QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
 _FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
 
@@ -90,7 +91,19 @@ def _framed(given, source_index, warnings):
             "so scale them to an ordinary size"
         )
     centre = low + (high - low) / 2
-    points = (given - centre) / scale
+    points = np.rint((given - centre) / (scale * _QUANTUM)) * _QUANTUM
+    distinct = _first_of_each(points, np.arange(len(points)))
+    if len(distinct) < len(points):
+        warnings = (
+            *warnings,
+            f"{len(points) - len(distinct)} points dropped: on top of others, to float64 in this box",
+        )
+        points, given, source_index = points[distinct], given[distinct], source_index[distinct]
+    if len(points) < MINIMUM_SAMPLES:
+        raise InputError(
+            f"{len(points)} points are distinct in a box of {scale:g}; "
+            f"at least {MINIMUM_SAMPLES} are needed for a surface"
+        )
     thickness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if thickness[1] < _FLATNESS * thickness[0]:
         raise InputError(f"all {len(points)} distinct points lie on one line; a surface needs points off it")

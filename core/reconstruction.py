@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .field.distance_field import DistanceField
+from .field.integration import NearBand
 from .surface.mesh import Mesh
 
 
@@ -16,9 +17,11 @@ class Reconstruction:
     source_index : (n',) int64, row of each sample in the input
     normals      : (n',3) float64 unit axes; the sign carries no meaning
     confidence   : (n',) float64 in [0,1], how well the neighbours agree on the axis
-    field        : DistanceField
-    surface      : Mesh, the closed double cover, or None where `surface` is "single" or "none"
-    sheet        : Mesh, the single layer, or None where `surface` is "double" or "none"
+    field        : DistanceField, signed where the setting `surface` is "signed"
+    surface      : Mesh, closed: the double cover, or where the setting `surface` is "signed" the boundary of the inside,
+                   wound outwards; None where it is "single" or "none"
+    sheet        : Mesh, the single layer, where the setting `surface` is "single" or "both"; else None
+    near         : NearBand, the nodes near the surface and the steps to them from their foot points
     report       : dict, JSON-ready: settings, counts, seconds per stage, peak memory, warnings
     """
 
@@ -29,4 +32,5 @@ class Reconstruction:
     field: DistanceField
     surface: Mesh | None
     sheet: Mesh | None
+    near: NearBand
     report: dict

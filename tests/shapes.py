@@ -73,6 +73,12 @@ def moebius(n: int, width: float = 0.6) -> np.ndarray:
     return _around(1 + offset * np.cos(angle / 2), turn, offset * np.sin(angle / 2))
 
 
+def cube(n: int) -> np.ndarray:
+    """The six faces of [-1, 1]^3."""
+    face = square(n // 6)
+    return np.concatenate([np.roll(face + [0, 0, side], axis, axis=1) for axis in range(3) for side in (-1, 1)])
+
+
 def junction(n: int) -> np.ndarray:
     """Three unit sheets that meet along the y axis: one horizontal sheet, x in [-1, 1], and a vertical one on top."""
     flat = square(2 * n // 3)

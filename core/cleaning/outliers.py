@@ -16,13 +16,14 @@ from .quadrics import fit_quadrics
 MINIMUM_SAMPLES = 100  # fewer leave nothing to compare a sample with
 
 _NEIGHBOURS = 8
-_ROUNDS = 8  # strays hide strays
+_ROUNDS = 4  # strays hide strays
 _SPARSE = 2.5  # spacing over the median of the cloud: candidates for scattered strays
 _LONELY = 2.0  # spacing over that of the neighbours
 _ALONE = 5.0  # so lonely that the plane no longer matters
 _OFF = 2.0  # distance from the neighbours' plane over their spacing
 _THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a cloud .3
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
+_WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
 _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
 _DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
@@ -75,7 +76,7 @@ class _Surroundings:
         theirs = np.maximum(np.median(self.spacing[self.neighbours[:, 1:]], axis=1), np.finfo(float).tiny)
         self.thickness = extent[:, 0] / size
         curve = extent[:, 1] < _CURVE * size
-        self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5)
+        self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5) | (curve.mean() > _WIREFRAME)
         self.lonely = self.spacing / theirs
         self.off = np.abs(np.einsum("ni,ni->n", points - centre, axes[:, :, 0])) / theirs
 

@@ -14,6 +14,7 @@ _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _ROUNDS = 2
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
+_EXACT = 1e-9  # residuals below this share of the radius are rounding
 _CHUNK = 400_000  # neighbours
 
 
@@ -73,7 +74,7 @@ def _fit(offset, distance):
         residual = height - np.einsum("mka,ma->mk", basis, coefficients)
         full = 1.0 / weight.sum(axis=1)  # the share of a sample that lies on its quadric
         scale = _CAUCHY * 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
-        weight = weight / (1.0 + (residual / np.maximum(scale, np.finfo(float).tiny)) ** 2)
+        weight = weight / (1.0 + (residual / np.maximum(scale, _EXACT * radius)) ** 2)
 
     slope = coefficients[:, 1:3] / radius
     upright = normal - np.einsum("ma,mai->mi", slope, frame)

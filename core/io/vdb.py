@@ -17,8 +17,8 @@ def write_vdb(path: str | os.PathLike, field: DistanceField, gradient: bool = Fa
     """Write `field` as the OpenVDB file `path`, 32-bit floats, placed by voxel size and origin in input units.
 
     udf      : the distances. Background: the band's half width, or the largest distance of a dense field, whose
-               values are kept over the whole box
-    density  : fog to look at, ``clip(1 - udf / (2 cells), 0, 1)``, background 0
+               values are kept over the whole box. Signed distances are named sdf instead, a level set
+    density  : fog to look at, ``clip(1 - |distance| / (2 cells), 0, 1)``, background 0
     gradient : (only if asked) vectors along which the distance grows, unit-free, by central differences
 
     Raises :class:`MissingDependency` without OpenVDB, :class:`VADError` where the file cannot be written whole.
@@ -34,10 +34,14 @@ def write_vdb(path: str | os.PathLike, field: DistanceField, gradient: bool = Fa
 def _grids(openvdb, field, gradient):
     values = np.asarray(field.values, np.float32)
     background = field.band if np.isfinite(field.band) else values.max()
+    fog = np.clip(1 - np.abs(values) / (_FOG_CELLS * field.spacing), 0, 1)
+    name = "sdf" if field.sdf else "udf"
     grids = [
-        _grid(openvdb, field, openvdb.FloatGrid(float(np.float32(background))), "udf", values),
-        _grid(openvdb, field, openvdb.FloatGrid(), "density", np.clip(1 - values / (_FOG_CELLS * field.spacing), 0, 1)),
+        _grid(openvdb, field, openvdb.FloatGrid(float(np.float32(background))), name, values),
+        _grid(openvdb, field, openvdb.FloatGrid(), "density", fog),
     ]
+    if field.sdf:
+        grids[0].gridClass = openvdb.GridClass.LEVEL_SET
     grids[1].gridClass = openvdb.GridClass.FOG_VOLUME
     if gradient:
         slopes = np.stack(np.gradient(values, np.float32(field.spacing)), axis=-1)

@@ -6,7 +6,7 @@ principal axis of that derivative is the normal, its product with the corners' s
 the cells around a grid edge vote whether the surface crosses it.
 
 A surface without border crosses an even number of the edges of every grid face. Where votes disagree, around creases
-mostly, edges are turned over that would leave fewer odd faces; this also takes single notches and spurs off rims.
+mostly, edges are turned over until it does (see :mod:`.mending`).
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from ..field.grid import Grid
 from ..field.integration import NearBand
 from ..field.local_surface import LocalSurface
 from ..linalg import principal_axes
+from .mending import mend
 
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
-_ROUNDS = 3
-_MAJORITY = 3  # odd faces, of the four around an edge, that turn it over
+_HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
 
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1])
@@ -50,14 +50,15 @@ class Crossings:
 def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
     """Crossings of the zero set, from the nodes near it."""
     cells, side = _sides(band, grid)
-    edge, crossed, place = _vote(cells, side, grid)
+    edge, vote, place = _vote(cells, side, grid)
     found = surface.project(place, progress)
     on = found.distance <= _COVERED * grid.spacing
-    edge, place, crossed = edge[on], place[on] - found.step[on], crossed[on]
+    edge, place, vote = edge[on], place[on] - found.step[on], vote[on]
     node, axis = np.divmod(edge, 3)
     whole = np.isin(Crossings(node, axis, place, cells).cells_around(grid), cells).all(axis=1)
-    node, axis, place, crossed = node[whole], axis[whole], place[whole], crossed[whole]
-    _mend(node, axis, crossed, grid)
+    node, axis, place, vote = node[whole], axis[whole], place[whole], vote[whole]
+    crossed = vote > 0
+    mend(node, axis, crossed, np.abs(vote), node_strides(grid))
     return Crossings(node[crossed], axis[crossed], place[crossed], cells)
 
 
@@ -77,7 +78,7 @@ def _sides(band, grid):
     corner = row.flat[lowest[:, None] + _CORNERS @ node_strides(grid)]
     whole = (corner >= 0).all(axis=1)
     lowest, corner = lowest[whole], corner[whole]
-    step = band.step[corner]
+    step = band.step[corner] + _HAIR * grid.spacing
     slope = np.einsum("cki,kj->cij", step, _CORNERS - 0.5)
     slope = slope + slope.transpose(0, 2, 1)
     normal, _ = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
@@ -85,7 +86,8 @@ def _sides(band, grid):
 
 
 def _vote(cells, side, grid):
-    """Edges of the cells, as lower node * 3 + axis (e,), whether the vote says crossed, and the likely place (e,3)."""
+    """Edges of the cells, as lower node * 3 + axis (e,), votes that they are crossed, positive if so, (e,), and the
+    likely places (e,3)."""
     a, b = side[:, _EDGES[:, 0]], side[:, _EDGES[:, 1]]
     key = 3 * (cells[:, None] + _CORNERS[_EDGES[:, 0]] @ node_strides(grid)) + _EDGE_AXIS
     opposite = (a >= 0) != (b >= 0)
@@ -97,27 +99,4 @@ def _vote(cells, side, grid):
     weight = np.bincount(index, certain.reshape(-1), len(edge))
     share = np.bincount(index, (certain * share).reshape(-1), len(edge)) / weight
     node, axis = np.divmod(edge, 3)
-    return edge, vote > 0, grid.positions(node) + grid.spacing * share[:, None] * np.eye(3)[axis]
-
-
-def _mend(node, axis, crossed, grid):
-    """Turn over, in place, crossings most of whose faces are odd; edges that share a face never at once."""
-    strides = node_strides(grid)
-    size = int(np.prod(grid.shape))
-    sides = [(axis + 1) % 3, (axis + 2) % 3]
-    faces = np.stack(
-        [across * size + node - back * strides[along] for along, across in (sides, sides[::-1]) for back in (0, 1)],
-        axis=1,
-    )
-    count, index = np.unique(faces, return_inverse=True)
-    faces = index.reshape(-1, 4)
-    odd = np.bincount(faces[crossed].reshape(-1), minlength=len(count)) % 2 == 1
-    position = np.stack(np.unravel_index(node, grid.shape), axis=1) % 2
-    every = np.arange(len(node))
-    colour = 4 * axis + 2 * position[every, sides[0]] + position[every, sides[1]]
-    groups = [np.flatnonzero(colour == c) for c in range(12)]
-    for _ in range(_ROUNDS):
-        for group in groups:
-            turned = group[odd[faces[group]].sum(axis=1) >= _MAJORITY]
-            crossed[turned] ^= True
-            odd[faces[turned].reshape(-1)] ^= True
+    return edge, vote, grid.positions(node) + grid.spacing * share[:, None] * np.eye(3)[axis]

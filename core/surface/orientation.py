@@ -15,6 +15,8 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     so that its area-weighted normals point away from the mesh's centre; a closed one points outwards.
     """
     n = len(mesh.faces)
+    if not n:
+        return mesh, 0
     tail, head = mesh.faces.reshape(-1), np.roll(mesh.faces, -1, axis=1).reshape(-1)
     key = np.minimum(tail, head).astype(np.int64) * len(mesh.vertices) + np.maximum(tail, head)
     order = np.argsort(key, kind="stable")
@@ -25,16 +27,19 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     a, b, against = owner[pair], owner[pair + 1], forward[pair] == forward[pair + 1]
 
     graph = coo_matrix((np.where(against, 2, 1), (a, b)), shape=(n, n)).tocsr()
-    graph = graph.maximum(graph.T)
     patches, patch = connected_components(graph, directed=False)
-    turned = np.zeros(n, bool)
-    for start in np.unique(patch, return_index=True)[1]:
-        visited, parent = breadth_first_order(graph, start, directed=False)
-        relation = np.asarray(graph[visited[1:], parent[visited[1:]]]).reshape(-1) == 2
-        for face, before, flip in zip(
-            visited[1:].tolist(), parent[visited[1:]].tolist(), relation.tolist(), strict=True
-        ):
-            turned[face] = turned[before] ^ flip
+    starts = np.unique(patch, return_index=True)[1]
+    tail, head = np.concatenate([a, starts]), np.concatenate([b, np.full(patches, n)])  # face n stands before all
+    relation = np.where(np.concatenate([against, np.zeros(patches, bool)]), 2, 1)
+    graph = coo_matrix((relation, (tail, head)), shape=(n + 1, n + 1)).tocsr()
+    graph = graph.maximum(graph.T)
+    visited, parent = breadth_first_order(graph, n, directed=False)
+    visited, parent = visited[1:], parent[visited[1:]]
+    flips = np.asarray(graph[visited, parent]).reshape(-1) == 2
+    turned = np.zeros(n + 1, bool)
+    for face, before, flip in zip(visited.tolist(), parent.tolist(), flips.tolist(), strict=True):
+        turned[face] = turned[before] ^ flip
+    turned = turned[:n]
 
     corners = mesh.vertices[mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

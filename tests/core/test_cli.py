@@ -11,6 +11,7 @@ import pytest
 from plyfile import PlyData
 
 from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
+from core.field.integration import NearBand
 from core.io.openvdb_module import load_openvdb
 from core.io.points import read_points
 from core.settings import options
@@ -51,6 +52,7 @@ def calls(monkeypatch):
             DistanceField(np.ones((4, 4, 4), np.float32), np.zeros(3), 0.25),
             mesh if settings.surface in ("double", "both") else None,
             mesh if settings.surface in ("single", "both") else None,
+            NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]])),
             REPORT,
         )
 

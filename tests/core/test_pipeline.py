@@ -111,9 +111,7 @@ class TestResult:
         assert report["counts"]["input"] == report["counts"]["samples"] == 1500
         assert report["counts"]["nodes"] == sphere_run.field.values.size
         mesh = sphere_run.surface
-        assert report["meshes"] == {
-            "double": {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": 0}
-        }
+        assert report["meshes"] == {"double": {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": 0}}
         assert {"points", "normals", "field", "surface"} <= report["seconds"].keys()
         assert all(seconds >= 0 for seconds in report["seconds"].values())
         assert report["spacing"] == pytest.approx(np.median(local_spacing(sphere_run.points)))

@@ -1,0 +1,211 @@
+"""How good the axes of each way to find them are, on points with true normals."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import igl
+import numpy as np
+
+from core.cleaning.clean import clean
+from core.linalg import outer, principal_axes
+from core.normals.adam import minimise
+from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
+from core.normals.mirrors import Mirrors
+from core.normals.pca import pca_normals
+from core.normals.reflection import reflection_sweeps
+from core.points import local_spacing, prepare_samples
+from core.voronoi.bisectors import bisector_samples
+from core.voronoi.facets import voronoi_facets
+from core.voronoi.polygons import facet_polygons
+
+from .cases import Case, load_case
+from .geometry import surface_points
+from .metrics import normal_agreement
+from .peers import check_open3d
+
+PCA_NEIGHBOURS = range(6, 25)
+PEER_NEIGHBOURS = 30
+DENSITIES = 3_000, 10_000
+CURVE_SWEEPS = 20  # from then on the solver holds axes back, which this module does not repeat
+
+PRINTED = EnergyWeights(distance=1, gradient=1e-3, alignment=1e2)
+_FACTORS = [(1, 1, 1), (1, 1, 10), (1, 1, 0.1), (1, 10, 1), (1, 0.1, 1), (10, 1, 1), (0.1, 1, 1)]
+
+_DENSE, _FEW, _SOME = 30_000, 500, 10_000
+_NOISE = 0.005  # of the longest side
+_CONTRAST = 30  # between the densest and the thinnest end of the non-uniform input
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Points of a case, what the solvers need of them, and their true normals.
+
+    points : (n,3) float64, unit frame     normals : (n,3) float64, true     given : (n,3) float64, the case's frame
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    given: np.ndarray
+    nm_curve: np.ndarray
+
+    @classmethod
+    def of(cls, points, normals, nm_curve=np.empty((0, 3))):
+        samples = prepare_samples(points)
+        return cls(samples.points, normals[samples.source_index], samples.given, nm_curve)
+
+    @cached_property
+    def spacing(self):
+        return local_spacing(self.points)
+
+    @cached_property
+    def samples(self):
+        return bisector_samples(facet_polygons(self.points, self.spacing), self.spacing)
+
+    @cached_property
+    def mirrors(self):
+        return Mirrors(self.points, self.samples.facets)
+
+    def energy(self, weights=EnergyWeights(), printed_alignment=False) -> NormalEnergy:
+        return NormalEnergy(self.points, self.spacing, self.samples, weights, printed_alignment)
+
+    def sweeps(self, start=None) -> np.ndarray:
+        return reflection_sweeps(self.points, self.samples.facets, start=start)[0]
+
+    def adam(self, energy: NormalEnergy, start=None) -> np.ndarray:
+        """Axes of least energy from the plane fit, or from `start`."""
+        return minimise(energy.value_and_gradient, self.mirrors.plane_fit() if start is None else start)[0]
+
+    def random_start(self) -> np.ndarray:
+        return random_axes(len(self.points), seed=0)
+
+    def agreement(self, axes: np.ndarray) -> dict:
+        return normal_agreement(axes, self.normals, self.given, self.nm_curve)
+
+
+def case_quality(path: Path, sampling: str) -> dict:
+    """Agreement of every method on one case, and what the page derives from it.
+
+    error_ratio : 1 - NC of the sweeps over that of the best PCA
+    start_gap   : |NC of the sweeps from random axes - NC of the sweeps from the plane fit|
+    distance_ratio : E_d of the sweeps over E_d of Adam
+    cleaned     : agreement of the sweeps after the pipeline's cleaning, for noisy cases only
+    """
+    case = load_case(path, sampling)
+    problem = Problem.of(case.points, case.normals, case.nm_curve)
+    energy = problem.energy()
+    swept, descended = problem.sweeps(), problem.adam(energy)
+    found = {
+        "sweeps": problem.agreement(swept),
+        "pca": best_pca(problem),
+        "open3d": problem.agreement(open3d_normals(problem.points)),
+        "adam": problem.agreement(descended),
+        "printed": problem.agreement(problem.adam(problem.energy(PRINTED, True), problem.random_start())),
+    }
+    random = problem.agreement(problem.sweeps(problem.random_start()))
+    return {
+        "case": case.name,
+        "category": case.meta["category"],
+        "points": len(problem.points),
+        **found,
+        "error_ratio": (1 - found["sweeps"]["nc"]) / (1 - found["pca"]["nc"]),
+        "start_gap": abs(random["nc"] - found["sweeps"]["nc"]),
+        "distance_ratio": energy.terms(swept)[0] / energy.terms(descended)[0],
+        "cleaned": _cleaned(case) if case.meta["category"] == "noisy" else None,
+    }
+
+
+def best_pca(problem: Problem) -> dict:
+    """Agreement of the plane fit whose number of neighbours, `k`, serves this case best by mean agreement."""
+    tried = [{**problem.agreement(pca_normals(problem.points, k)[0]), "k": k} for k in PCA_NEIGHBOURS]
+    return max(tried, key=lambda found: found["nc"])
+
+
+def open3d_normals(points: np.ndarray) -> np.ndarray:
+    """(n,3) axes of Open3D's plane fit over PEER_NEIGHBOURS. Raises :class:`MissingDependency`."""
+    check_open3d()
+    import open3d
+
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(PEER_NEIGHBOURS))
+    return np.asarray(cloud.normals)
+
+
+def _cleaned(case):
+    samples, _ = clean(prepare_samples(case.points))
+    axes = reflection_sweeps(samples.points, voronoi_facets(samples.points, local_spacing(samples.points)))[0]
+    rows = samples.source_index
+    return normal_agreement(axes, case.normals[rows], case.points[rows], case.nm_curve)
+
+
+def ablation(case: Case) -> list[dict]:
+    """NC for the paper's seven combinations of weights, at DENSITIES points of the case's true surface.
+
+    Each is tried twice: as multiples of the printed weights and as the same multiples of the defaults.
+    """
+    rows = []
+    for count in DENSITIES:
+        problem = surface_problem(case, count)
+        row = {"points": count, "sweeps": problem.agreement(problem.sweeps())["nc"]}
+        for name, base in (("printed", PRINTED), ("default", EnergyWeights())):
+            weights = combinations(base)
+            row[name] = [problem.agreement(problem.adam(problem.energy(w)))["nc"] for w in weights]
+        rows.append(row)
+    return rows
+
+
+def combinations(base: EnergyWeights) -> list[EnergyWeights]:
+    """The paper's seven variations, around `base`."""
+    return [EnergyWeights(d * base.distance, g * base.gradient, a * base.alignment) for a, d, g in _FACTORS]
+
+
+def surface_problem(case: Case, count: int, seed: int = 0) -> Problem:
+    """`count` points of the true surface, uniform by area."""
+    return _on_surface(case, surface_points(case.truth, count, np.random.default_rng(seed)))
+
+
+def convergence(case: Case) -> dict:
+    """For each kind of input: its number of points, the energy before each step of Adam relative to the first, and the
+    mean turn of an axis in each of the first sweeps, degrees. Both start from random axes, as in the paper."""
+    curves = {}
+    for name, problem in _inputs(case).items():
+        _, history = minimise(problem.energy().value_and_gradient, problem.random_start())
+        turns = mean_turns(problem.mirrors, problem.random_start(), CURVE_SWEEPS)
+        curves[name] = {"points": len(problem.points), "energy": np.divide(history, history[0]), "turns": turns}
+    return curves
+
+
+def mean_turns(mirrors: Mirrors, axes: np.ndarray, sweeps: int) -> list[float]:
+    """Mean angle between the axes (n,3) before and after each sweep, degrees; at most the first CURVE_SWEEPS."""
+    turns = []
+    for _ in range(sweeps):
+        turned, _ = principal_axes(mirrors.gather @ outer(mirrors.images(axes)) - mirrors.alignment)
+        cosine = np.abs(np.einsum("ni,ni->n", turned, axes))
+        turns.append(float(np.degrees(np.arccos(np.minimum(cosine, 1.0)).mean())))
+        axes = turned
+    return turns
+
+
+def _inputs(case):
+    rng = np.random.default_rng(0)
+    dense = surface_points(case.truth, 5 * _SOME, rng)
+    along = (dense - dense.min(axis=0)) / np.ptp(dense, axis=0).max()
+    density = _CONTRAST ** -along[:, np.ptp(along, axis=0).argmax()]
+    thinned = dense[rng.choice(len(dense), _SOME, replace=False, p=density / density.sum())]
+    sigma = _NOISE * np.ptp(case.truth.vertices, axis=0).max()
+    return {
+        "dense": _on_surface(case, dense[:_DENSE]),
+        "uniform": Problem.of(case.points, case.normals),
+        "non-uniform": _on_surface(case, thinned),
+        "sparse": _on_surface(case, dense[:_FEW]),
+        "noisy": _on_surface(case, dense[:_SOME] + sigma * rng.normal(size=(_SOME, 3))),
+    }
+
+
+def _on_surface(case, points):
+    """The points, with the normals of the true faces nearest to them."""
+    corners = case.truth.vertices[case.truth.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    _, nearest, _ = igl.point_mesh_squared_distance(points, case.truth.vertices, case.truth.faces.astype(np.int64))
+    return Problem.of(points, normals[nearest.ravel()])

@@ -1,0 +1,69 @@
+"""The plots of docs/normals.md."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+
+from core.io.atomic import atomic_path
+
+INK, QUIET, ACCENT = "#1b2430", "#66707c", "#e4572e"
+_COLOURS = "#17344f", "#3f7fa3", "#e4572e", "#c9a227", "#6a8d55"
+_STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "text.color": INK,
+    "axes.edgecolor": QUIET,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6e9ec",
+    "legend.frameon": False,
+}
+
+
+def plot_convergence(path: Path, curves: dict[str, dict], tolerance: float) -> None:
+    """Energy before each step of Adam, and mean turn of an axis in each sweep; see `convergence`.
+
+    tolerance : degrees, mean turn at which the sweeps end
+    """
+    with plt.rc_context(_STYLE):
+        figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+        for colour, (name, curve) in zip(_COLOURS, curves.items(), strict=True):
+            left.plot(curve["energy"], color=colour, label=f"{name}, {curve['points']:,} points")
+            right.plot(range(1, len(curve["turns"]) + 1), curve["turns"], color=colour, marker=".")
+        left.set(yscale="log", xlabel="step of Adam", ylabel="energy / energy of the random start")
+        left.legend()
+        right.axhline(tolerance, color=QUIET, linestyle="--", linewidth=1)
+        right.annotate("the sweeps end here", (1, tolerance), (0, 4), textcoords="offset points", color=QUIET)
+        right.set(yscale="log", xlabel="sweep", ylabel="mean turn of an axis, degrees")
+        _save(figure, path)
+
+
+def plot_growth(path: Path, measured: list[dict]) -> None:
+    """CPU time of the stage and of Delaunay alone over the number of points, in units of Delaunay's at the fewest."""
+    counts, unit = [run["points"] for run in measured], measured[0]["delaunay_cpu"]
+    with plt.rc_context(_STYLE):
+        figure, axes = plt.subplots(figsize=(6.5, 4.2), layout="constrained")
+        for key, label, colour in (
+            ("stage_cpu", "facets and sweeps", ACCENT),
+            ("delaunay_cpu", "scipy.spatial.Delaunay alone", _COLOURS[1]),
+        ):
+            axes.plot(counts, [run[key] / unit for run in measured], color=colour, marker="o", label=label)
+        straight = measured[0]["stage_cpu"] / unit
+        axes.plot(
+            counts, [straight * n / counts[0] for n in counts], color=QUIET, linestyle="--", linewidth=1, label="linear"
+        )
+        axes.set(xscale="log", yscale="log", xlabel="points", ylabel=f"CPU time / Delaunay's at {counts[0]:,} points")
+        axes.legend()
+        _save(figure, path)
+
+
+def _save(figure, path):
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+    plt.close(figure)

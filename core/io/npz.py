@@ -1,0 +1,39 @@
+"""The field as plain arrays, for other programs to extract surfaces from."""
+
+import os
+
+import numpy as np
+
+from ..reconstruction import Reconstruction
+from .atomic import atomic_path
+
+
+def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
+    """Write the field of `result` as the NumPy archive `path`, for ``numpy.load(path, allow_pickle=False)``:
+
+    values    : (nx,ny,nz) float32, distances in input units; node (i,j,k) lies at ``origin + spacing * (i,j,k)``
+    origin    : (3,) float64     spacing : float64, one cell     signed : bool, whether values are negative inside
+    gradient  : (nx,ny,nz,3) float32, unit-free, of `values` by central differences; at nodes next to the surface of an
+                unsigned field these see both of its sides, use `direction` there
+    node      : (b,3) int32, indices (i,j,k) of the nodes within two cells of the surface
+    direction : (b,3) float32, there the unit direction away from the surface: the fused direction field, signed, that
+                the distance grows along; zero at nodes on the surface
+    foot      : (b,3) float64, the point of the surface that the distance is measured to
+
+    Raises :class:`VADError` where the file cannot be written whole.
+    """
+    field, near = result.field, result.near
+    length = np.linalg.norm(near.step, axis=1, keepdims=True)
+    node = np.stack(np.unravel_index(near.node, field.values.shape), axis=1)
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(
+            file,
+            values=field.values,
+            origin=field.origin,
+            spacing=field.spacing,
+            signed=field.sdf,
+            gradient=np.stack(np.gradient(field.values, np.float32(field.spacing)), axis=-1),
+            node=node.astype(np.int32),
+            direction=(near.step / np.where(length > 0, length, 1.0)).astype(np.float32),
+            foot=field.origin + field.spacing * node - near.step,
+        )

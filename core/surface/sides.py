@@ -1,0 +1,145 @@
+"""Which nodes of the grid lie inside a closed shape.
+
+The paper's appendix orients the samples, by spreading an outside label from the box through the Voronoi vertices. Here
+the label spreads over the grid, where each node decides with all its neighbours: Voronoi vertices close to the surface
+(slivers, creases, noise) take either side, and one that errs misleads every sample after it.
+
+Nodes far from the surface fall into regions, of which the one at the box is outside. Between them, the side s of each
+node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the surface and of (s_a + s_b)^2 over those
+that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Nested shells so get alternating sides:
+a hollow ball is inside between its walls, and outside within.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import label
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import cg
+from scipy.spatial import KDTree
+
+from ..field.grid import Grid
+from ..field.local_surface import LocalSurface
+from .crossings import Crossings, node_strides
+
+_NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
+_SPECK = 27  # nodes
+_TOLERANCE = 1e-3
+_ADJACENT = 1.8  # cells, crossings of one patch
+_OPEN = 0.05  # share of crossings with one side at both ends that a closed shape may have
+_PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening that does not count
+
+
+@dataclass(frozen=True)
+class Sides:
+    """The inside, and the crossings that contradict it.
+
+    inside    : (nx,ny,nz) bool
+    alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
+                an open surface
+    within    : (w,) bool, whether that side is the inside
+    share     : float in [0,1], of all crossings that these are
+    spanned   : float, where the sides differ and no crossing is, relative to all crossings: openings
+    largest   : float, the largest connected patch of either, relative to all crossings
+    """
+
+    inside: np.ndarray
+    alike: np.ndarray
+    within: np.ndarray
+    share: float
+    spanned: float
+    largest: float
+
+    @property
+    def closed(self) -> bool:
+        """Whether the surface bounds the inside, but for small parts."""
+        return self.share <= _OPEN
+
+    @property
+    def complete(self) -> bool:
+        """Whether what bounds the inside is the surface and nothing else, but for specks."""
+        return self.closed and self.largest <= _PATCH
+
+    def sign(self, values: np.ndarray) -> np.ndarray:
+        """Distances (nx,ny,nz) with their signs: negative inside."""
+        return np.where(self.inside, -values, values)
+
+
+def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid) -> Sides:
+    """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32 and the crossed grid edges.
+
+    Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges.
+    """
+    far = 0.5 * surface.bridge * float(np.median(surface.spacing)) / grid.spacing
+    near = np.zeros(grid.shape, bool)
+    inner = (slice(1, -1),) * 3
+    near[inner] = values[inner] <= np.clip(far, _NEAREST, _FARTHEST) * grid.spacing
+    regions, count = label(~near)
+    outside = int(regions[0, 0, 0]) - 1
+    cluster = regions.reshape(-1) - 1
+    cluster[near.reshape(-1)] = count + np.arange(near.sum())
+    a, b, crossed = _edges_of(np.flatnonzero(near), crossings, grid)
+    inside = _sides(cluster[a], cluster[b], crossed, count + int(near.sum()), outside)[cluster] < 0
+    _drop_specks(inside.reshape(grid.shape))
+
+    differ = inside[a] != inside[b]
+    alike, spanned = crossed & ~differ, ~crossed & differ
+    middle = 0.5 * (grid.positions(a) + grid.positions(b))
+    reach = _ADJACENT * grid.spacing
+    largest = max(_largest_patch(middle[alike], reach), _largest_patch(middle[spanned], reach))
+    total = max(int(crossed.sum()), 1)
+    return Sides(
+        inside=inside.reshape(grid.shape),
+        alike=middle[alike],
+        within=inside[a[alike]],
+        share=int(alike.sum()) / total,
+        spanned=int(spanned.sum()) / total,
+        largest=largest / total,
+    )
+
+
+def _edges_of(near, crossings, grid):
+    """Grid edges with an end among the `near` nodes: their ends (e,), (e,) and whether the surface crosses them."""
+    at = np.stack(np.unravel_index(near, grid.shape), axis=1)
+    strides = node_strides(grid)
+    keys = []
+    for axis in range(3):
+        keys += [3 * near[at[:, axis] < grid.shape[axis] - 1] + axis]
+        keys += [3 * (near[at[:, axis] > 0] - strides[axis]) + axis]
+    keys = np.unique(np.concatenate(keys))
+    node, axis = np.divmod(keys, 3)
+    return node, node + strides[axis], np.isin(keys, 3 * crossings.node + crossings.axis)
+
+
+def _sides(a, b, crossed, n, outside):
+    """The side of each of n clusters in [-1,1], from edges (a, b) between them; cluster `outside` is 1."""
+    kept = a != b
+    a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
+    links = coo_matrix((np.r_[weight, weight], (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
+    degree = np.bincount(np.r_[a, b], minlength=n).astype(float)
+    free = np.flatnonzero(np.arange(n) != outside)
+    matrix = (diags(degree) - links)[free][:, free]
+    push = np.asarray(links[free, outside].todense()).reshape(-1)
+    found, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=1000, M=diags(1 / np.maximum(degree[free], 1.0)))
+    side = np.ones(n)
+    side[free] = found
+    return side
+
+
+def _drop_specks(side):
+    """Turn over, in place, connected sets of less than _SPECK nodes on one side."""
+    for inside in (True, False):
+        part, _ = label(side == inside)
+        small = np.bincount(part.reshape(-1)) < _SPECK
+        small[0] = False
+        side[small[part]] = not inside
+
+
+def _largest_patch(middle, reach):
+    """The most points (m,3) of which each is within `reach` of another."""
+    if not len(middle):
+        return 0
+    pairs = KDTree(middle).query_pairs(reach, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(middle),) * 2)
+    return int(np.bincount(connected_components(graph, directed=False)[1]).max())

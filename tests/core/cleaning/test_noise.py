@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from core.cleaning.noise import LADDER, estimate_noise, is_noisy
+from core.points import local_spacing
+from tests import shapes
+
+CLEAN = {
+    "sphere": shapes.scattered_sphere(3000),
+    "moebius": shapes.moebius(2000),
+    "junction": shapes.junction(2000),
+    "cylinder": shapes.cylinder(1500),
+    "few": shapes.scattered_sphere(120),
+    "close sheets": shapes.sheets(2000, gap=0.1),
+}
+
+
+def noisy(points, deviation, seed=7):
+    return points + np.random.default_rng(seed).normal(size=points.shape) * deviation
+
+
+@pytest.mark.parametrize("name", CLEAN)
+def test_clean_clouds_are_not_noisy(name):
+    assert not is_noisy(CLEAN[name], local_spacing(CLEAN[name]))
+
+
+@pytest.mark.parametrize("share", [0.15, 0.5, 1.0])
+def test_noise_is_noticed_and_measured(share):
+    points = shapes.scattered_sphere(5000)
+    deviation = share * np.median(local_spacing(points))
+    points = noisy(points, deviation)
+    assert is_noisy(points, local_spacing(points))
+    assert np.median(estimate_noise(points).level) == pytest.approx(deviation, rel=0.2)
+
+
+def test_noise_in_one_place_is_no_noisy_cloud():
+    """What is rough in places may be detail."""
+    points = shapes.scattered_sphere(4000)
+    rough = points[:, 2] > 0.6
+    points[rough] = noisy(points[rough], 0.02)
+    assert not is_noisy(points, local_spacing(points))
+
+
+def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():
+    ring = shapes.torus(6000, major=1.0, minor=0.15)
+    few, many = (np.median(estimate_noise(noisy(ring, deviation)).neighbours) for deviation in (0.002, 0.02))
+    assert LADDER[0] <= few < many <= LADDER[-1] * 1.001
+    flat = np.median(estimate_noise(noisy(shapes.square(6000), 0.002)).neighbours)
+    assert few < flat
+
+
+def test_estimates_follow_the_scale():
+    points = noisy(shapes.scattered_sphere(2000), 0.02)
+    here, there = estimate_noise(points), estimate_noise(4 * points)
+    np.testing.assert_allclose(there.level, 4 * here.level, rtol=1e-6)
+    np.testing.assert_allclose(there.neighbours, here.neighbours, rtol=1e-6)

@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from core.cleaning.outliers import find_outliers
+from tests import shapes
+
+
+def edges_of_a_box(n):
+    """Points at random places of the twelve edges of a box."""
+    rng = np.random.default_rng(0)
+    corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), -1).reshape(-1, 3) * [1.0, 0.6, 0.4]
+    pairs = [(a, b) for a in range(8) for b in range(a) if (corners[a] != corners[b]).sum() == 1]
+    ends = corners[np.array(pairs)[rng.integers(0, 12, n)]]
+    t = rng.random((n, 1))
+    return ends[:, 0] * t + ends[:, 1] * (1 - t)
+
+
+def mixed_densities():
+    """A sphere sampled with 200, 1,000 and 5,000 points a third."""
+    points = shapes.scattered_sphere(30_000)
+    third = np.digitize(points[:, 0], [-1 / 3, 1 / 3])
+    return np.concatenate([points[third == i][:count] for i, count in enumerate((200, 1000, 5000))])
+
+
+THIN_BUT_REAL = {
+    "wireframe": edges_of_a_box(1000),
+    "sparse wireframe": edges_of_a_box(150),
+    "helix": np.stack([np.cos(t := np.linspace(0, 20, 400)), np.sin(t), 0.1 * t], axis=1),
+    "mixed densities": mixed_densities(),
+    "sphere": shapes.scattered_sphere(3000),
+    "few on a sphere": shapes.scattered_sphere(110),
+    "moebius": shapes.moebius(2000),
+    "junction": shapes.junction(1500),
+    "close sheets": shapes.sheets(1500, gap=0.05),
+    "two apart": np.vstack([shapes.scattered_sphere(2000), 0.3 * shapes.scattered_sphere(500) + 40]),
+    "a small part": np.vstack([shapes.scattered_sphere(3000), 0.05 * shapes.scattered_sphere(50) + [1.3, 0, 0]]),
+    "four points": np.vstack([np.eye(3), np.zeros((1, 3))]),
+}
+
+
+@pytest.mark.parametrize("name", THIN_BUT_REAL)
+def test_thin_but_real_stays_whole(name):
+    assert not find_outliers(THIN_BUT_REAL[name]).any()
+
+
+def with_strays(strays):
+    clean = shapes.scattered_sphere(5000)
+    return np.vstack([clean, strays]), np.arange(5000 + len(strays)) >= 5000
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.01, 0.9), (0.05, 0.95), (0.2, 0.95)])
+def test_scattered_strays_are_found(share, found):
+    points, stray = with_strays(np.random.default_rng(1).uniform(-1.5, 1.5, (int(share * 5000), 3)))
+    marked = find_outliers(points)
+    assert marked[stray].mean() > found
+    assert marked[~stray].mean() < 0.01
+
+
+def test_strays_beside_the_surface_are_found():
+    rng = np.random.default_rng(1)
+    points, stray = with_strays(shapes.scattered_sphere(250, seed=5) * (1 + rng.choice([-1, 1], (250, 1)) * 0.15))
+    marked = find_outliers(points)
+    assert marked[stray].mean() > 0.9
+    assert marked[~stray].mean() < 0.01
+
+
+def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
+    rng = np.random.default_rng(1)
+    points, stray = with_strays(rng.normal(size=(60, 3)) * 0.05 + [2, 0, 0])
+    np.testing.assert_array_equal(find_outliers(points), stray)
+    flat = np.column_stack([rng.uniform(-0.2, 0.2, (60, 2)), np.zeros(60)]) + [2, 0, 0]
+    assert not find_outliers(with_strays(flat)[0]).any()
+
+
+@pytest.mark.parametrize("far", [3.0, 1e3, 1e6])
+def test_one_far_sample_is_found(far):
+    points, stray = with_strays(np.array([[far, 0, 0]]))
+    np.testing.assert_array_equal(find_outliers(points), stray)

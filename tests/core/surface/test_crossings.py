@@ -1,0 +1,116 @@
+"""Crossings against exact bands: steps of closed-form shapes, no samples in between."""
+
+import numpy as np
+import pytest
+
+from core import Cancelled
+from core.field.grid import Grid
+from core.field.integration import BAND, NearBand
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.crossings import _HAIR, Crossings, find_crossings, node_strides
+from tests import shapes
+
+GRID = Grid(np.array([-1.31, -1.29, -1.33]), 0.1, (28, 27, 28))
+
+
+def exact_band(foot):
+    """The band of a shape of which `foot` gives the foot points (m,3) of positions (m,3)."""
+    every = np.arange(np.prod(GRID.shape))
+    at = GRID.positions(every)
+    step = at - foot(at)
+    near = np.linalg.norm(step, axis=1) <= BAND * GRID.spacing
+    return NearBand(every[near], step[near])
+
+
+def local(points, normals):
+    return fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    points = shapes.sphere(1500)
+    return exact_band(lambda x: x / np.linalg.norm(x, axis=1, keepdims=True)), local(points, points)
+
+
+@pytest.fixture(scope="module")
+def sphere_crossings(sphere):
+    return find_crossings(*sphere, GRID)
+
+
+def truly_crossed(inside):
+    """Keys of the grid edges that a shape with `inside`, (nodes,) bool, crosses."""
+    inside, keys = inside.reshape(GRID.shape), []
+    node = np.arange(inside.size).reshape(GRID.shape)
+    for axis in range(3):
+        low = np.delete(node, -1, axis=axis)
+        change = np.delete(inside, -1, axis=axis) != np.delete(inside, 0, axis=axis)
+        keys.append(3 * low[change] + axis)
+    return np.sort(np.concatenate(keys))
+
+
+def test_a_sphere_crosses_the_edges_that_it_does(sphere_crossings):
+    """As seen from nodes that are moved by the hair that keeps them off surfaces."""
+    nodes = GRID.positions(np.arange(np.prod(GRID.shape))) + _HAIR * GRID.spacing
+    found = 3 * sphere_crossings.node + sphere_crossings.axis
+    true = truly_crossed(np.linalg.norm(nodes, axis=1) < 1)
+    assert len(np.setxor1d(found, true)) < 0.005 * len(true)
+
+
+def test_every_face_is_crossed_an_even_number_of_times(sphere_crossings):
+    cells = sphere_crossings.cells_around(GRID)
+    pairs = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    assert set(np.unique(pairs, axis=0, return_counts=True)[1]) == {2}
+
+
+def test_places_lie_on_the_surface_and_on_their_edges(sphere_crossings):
+    assert shapes.sphere_distance(sphere_crossings.place).max() < 0.01 * GRID.spacing
+    low = GRID.positions(sphere_crossings.node)
+    offset = (sphere_crossings.place - low) / GRID.spacing
+    along = np.take_along_axis(offset, sphere_crossings.axis[:, None], axis=1)
+    assert -0.6 < along.min() < along.max() < 1.6
+    assert 0.4 < along.mean() < 0.6
+
+
+def test_cells_around_an_edge_share_it():
+    strides = node_strides(GRID)
+    assert strides.tolist() == [27 * 28, 28, 1]
+    node = np.full(3, strides @ [5, 6, 7])
+    cells = Crossings(node, np.arange(3), np.zeros((3, 3)), np.empty(0, int)).cells_around(GRID)
+    for axis, around in enumerate(cells):
+        corners = np.stack(np.unravel_index(around, GRID.shape), axis=1) - [5, 6, 7]
+        assert set(corners[:, axis]) == {0}
+        assert sorted(map(tuple, np.delete(corners, axis, axis=1))) == [(-1, -1), (-1, 0), (0, -1), (0, 0)]
+        assert (np.abs(corners - np.roll(corners, 1, axis=0)).sum(axis=1) == 1).all()
+
+
+def test_nothing_is_crossed_past_the_rim():
+    points = shapes.disc(1500)
+
+    def foot(x):
+        lateral = np.hypot(x[:, 0], x[:, 1])[:, None]
+        return x * [1, 1, 0] / np.maximum(lateral, 1)
+
+    found = find_crossings(exact_band(foot), local(points, np.tile([0.0, 0, 1], (len(points), 1))), GRID)
+    assert set(found.axis) == {2}
+    lateral = np.linalg.norm(GRID.positions(found.node)[:, :2], axis=1)
+    assert lateral.max() < 1 + 0.6 * GRID.spacing
+    assert len(found.node) == pytest.approx(np.pi * (1 / GRID.spacing + 0.5) ** 2, rel=0.03)
+
+
+def test_a_sheet_through_grid_nodes_is_one_plane_of_edges():
+    """Every node of the plane takes the same side, so the sheet is flat and nothing in it is crossed."""
+    plane = GRID.origin[2] + 13 * GRID.spacing
+    points = shapes.square(1500) + [0, 0, plane]
+    surface = local(points, np.tile([0.0, 0, 1], (len(points), 1)))
+    noise = np.random.default_rng(0).normal(scale=1e-9, size=(np.prod(GRID.shape), 3))
+    found = find_crossings(
+        exact_band(lambda x: np.clip(x, [-1, -1, plane], [1, 1, plane]) + noise[: len(x)]), surface, GRID
+    )
+    assert set(found.axis) == {2}
+    assert len(set(np.unravel_index(found.node, GRID.shape)[2])) == 1
+
+
+def test_stops_when_told(sphere):
+    with pytest.raises(Cancelled):
+        find_crossings(*sphere, GRID, lambda *_: False)

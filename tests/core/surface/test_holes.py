@@ -1,0 +1,93 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from core import Mesh
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.holes import fill_pinholes
+from tests import shapes
+
+CELL = 0.05
+
+
+@pytest.fixture(scope="module")
+def plane():
+    """The local surface of a square in z = 0 with gaps bridged up to two spacings."""
+    points = shapes.square(1000)
+    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    return fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 2.0)
+
+
+def lattice(holes, height=0.0, n=30):
+    """A square sheet of n x n cells around the origin without the quads `holes`, at a height."""
+    side = np.arange(n + 1)
+    x, y = np.meshgrid((side - n / 2) * CELL, (side - n / 2) * CELL, indexing="ij")
+    i, j = np.array([(i, j) for i in range(n) for j in range(n) if (i, j) not in holes]).T
+    a, b, c, d = (i * (n + 1) + j for i, j in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1), faces.astype(np.int32))
+
+
+def block(width, at=10):
+    return {(i, j) for i in range(at, at + width) for j in range(at, at + width)}
+
+
+def faults(mesh):
+    return int((mesh.edge_counts()[1] > 2).sum())
+
+
+@pytest.mark.parametrize(
+    "holes",
+    [
+        block(1),
+        block(2),
+        block(4),
+        block(1) | block(1, 20),  # two apart
+        {(10, 10), (11, 11)},  # two that touch at a corner
+        {(10, 10), (11, 11), (10, 12), (9, 11)},  # four around a corner of each
+    ],
+)
+def test_pinholes_on_the_surface_close_and_the_rim_stays(plane, holes):
+    mesh = fill_pinholes(lattice(holes), plane, CELL)
+    assert (mesh.border_loops(), faults(mesh)) == (1, 0)
+    assert mesh.face_areas().sum() == pytest.approx((30 * CELL) ** 2)
+    np.testing.assert_allclose(mesh.vertices[:, 2], 0, atol=1e-9)
+
+
+def test_a_loop_longer_than_32_edges_stays(plane):
+    mesh = lattice(block(9, 5))
+    assert fill_pinholes(mesh, plane, CELL).border_loops() == 2
+
+
+def test_an_opening_where_no_surface_is_stays(plane):
+    """Three cells above the surface and wider than the bridging length."""
+    assert 4 * CELL > 2.0 * np.median(plane.spacing)
+    assert fill_pinholes(lattice(block(4), 3 * CELL), plane, CELL).border_loops() == 2
+
+
+@pytest.mark.parametrize(("bridge", "loops"), [(2.0, 2), (4.0, 1)])
+def test_an_opening_narrower_than_the_bridging_length_closes_anywhere(plane, bridge, loops):
+    """A hole of two cells, 2.8 across its corners, off the surface."""
+    assert 2.0 * np.median(plane.spacing) < 2 * np.sqrt(2) * CELL < 4.0 * np.median(plane.spacing)
+    surface = dataclasses.replace(plane, bridge=bridge)
+    assert fill_pinholes(lattice(block(2), 3 * CELL), surface, CELL).border_loops() == loops
+
+
+def test_an_opening_below_the_cells_closes_anywhere(plane):
+    surface = dataclasses.replace(plane, bridge=0.1)
+    assert fill_pinholes(lattice(block(1), 3 * CELL), surface, CELL).border_loops() == 1
+
+
+def test_what_is_closed_stays_as_it_is(plane):
+    mesh = Mesh(np.eye(4, 3), np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32))
+    assert fill_pinholes(mesh, plane, CELL) is mesh
+
+
+def test_edges_that_form_no_loop_are_left_alone(plane):
+    """Three triangles on one edge: border paths that end at it still close around it, but nothing is doubled."""
+    vertices = np.array([[0, 0, 0], [0, 0.5, 0], [0.5, 0, 0], [-0.5, 0, 0], [0, 0, 0.5]])
+    mesh = fill_pinholes(Mesh(vertices, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], np.int32)), plane, 0.01)
+    corners = np.sort(mesh.faces, axis=1)
+    assert len(np.unique(corners, axis=0)) == len(corners)

@@ -1,0 +1,107 @@
+"""Sides of nodes, from exact distances and crossings of balls."""
+
+import numpy as np
+import pytest
+
+from core.field.grid import Grid
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.crossings import Crossings
+from core.surface.sides import Sides, find_sides
+from tests import shapes
+
+GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
+RADIUS = np.linalg.norm(GRID.positions(np.arange(29**3)), axis=1).reshape(GRID.shape)
+
+
+@pytest.fixture(scope="module")
+def surface():
+    points = shapes.sphere(1500)
+    return fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0)
+
+
+def crossings_of(inside):
+    node, axis = [], []
+    flat = np.arange(inside.size).reshape(inside.shape)
+    for a in range(3):
+        change = np.delete(inside, -1, axis=a) != np.delete(inside, 0, axis=a)
+        node.append(np.delete(flat, -1, axis=a)[change])
+        axis.append(np.full(change.sum(), a))
+    node, axis = np.concatenate(node), np.concatenate(axis)
+    return Crossings(node, axis, GRID.positions(node), np.empty(0, int))
+
+
+def without(crossings, dropped):
+    return Crossings(crossings.node[~dropped], crossings.axis[~dropped], crossings.place[~dropped], crossings.cells)
+
+
+@pytest.mark.parametrize(
+    ("inside", "distance"),
+    [
+        (RADIUS < 1, np.abs(RADIUS - 1)),
+        ((RADIUS < 1) & (RADIUS > 0.5), np.minimum(np.abs(RADIUS - 1), np.abs(RADIUS - 0.5))),  # hollow
+        (np.zeros(GRID.shape, bool), np.full(GRID.shape, 9.0)),
+    ],
+)
+def test_exact_crossings_give_exact_sides(surface, inside, distance):
+    sides = find_sides(distance, crossings_of(inside), surface, GRID)
+    np.testing.assert_array_equal(sides.inside, inside)
+    assert (sides.share, sides.spanned, sides.largest, len(sides.alike)) == (0, 0, 0, 0)
+    assert sides.closed
+    assert sides.complete
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.2])
+def test_missing_crossings_are_outvoted(surface, share):
+    """At random, out of all; what is spanned says how many."""
+    crossings = crossings_of(RADIUS < 1)
+    dropped = np.random.default_rng(0).random(len(crossings.node)) < share
+    sides = find_sides(np.abs(RADIUS - 1), without(crossings, dropped), surface, GRID)
+    assert (sides.inside != (RADIUS < 1)).sum() <= share * 100
+    assert sides.spanned == pytest.approx(share / (1 - share), rel=0.3)
+
+
+@pytest.mark.parametrize(("height", "closed"), [(0.99, True), (0.4, False), (-0.2, False)])
+def test_a_wide_opening_lets_the_outside_in(surface, height, closed):
+    """A sphere without its cap: no crossings there, and distances to the rest."""
+    crossings = crossings_of(RADIUS < 1)
+    z = GRID.origin[2] + GRID.spacing * np.arange(29)
+    above = (z > height * RADIUS) & (RADIUS > 0)
+    lateral = np.sqrt(np.maximum(RADIUS**2 - z**2, 0))
+    rim = np.hypot(lateral - np.sqrt(1 - height**2), z - height)
+    opened = without(crossings, crossings.place[:, 2] > height)
+    sides = find_sides(np.where(above, rim, np.abs(RADIUS - 1)), opened, surface, GRID)
+    assert sides.closed == closed
+    if not closed:
+        assert not sides.complete
+        assert sides.share > 0.5
+        assert not sides.within.any()
+        np.testing.assert_allclose(np.linalg.norm(sides.alike, axis=1), 1, atol=GRID.spacing)
+
+
+def test_an_inner_wall_has_the_inside_on_both_faces(surface):
+    inside = RADIUS < 1
+    crossings = crossings_of(inside)
+    flat = np.arange(inside.size).reshape(inside.shape)
+    wall = flat[:, :, 14][inside[:, :, 14] & inside[:, :, 15]]
+    both = Crossings(
+        np.concatenate([crossings.node, wall]),
+        np.concatenate([crossings.axis, np.full(len(wall), 2)]),
+        np.concatenate([crossings.place, GRID.positions(wall)]),
+        crossings.cells,
+    )
+    z = GRID.origin[2] + GRID.spacing * np.arange(29)
+    distance = np.minimum(np.abs(RADIUS - 1), np.hypot(z - 0.04, np.maximum(RADIUS - 1, 0)))
+    sides = find_sides(distance, both, surface, GRID)
+    assert not sides.complete
+    assert sides.within.mean() > 0.9
+    assert sides.share > 0.05
+
+
+def test_signs():
+    values = np.ones((2, 2, 2), np.float32)
+    inside = np.zeros((2, 2, 2), bool)
+    inside[0] = True
+    signed = Sides(inside, np.empty((0, 3)), np.empty(0, bool), 0.0, 0.0, 0.0).sign(values)
+    assert signed.dtype == np.float32
+    np.testing.assert_array_equal(signed, np.where(inside, -1, 1))

@@ -1,0 +1,130 @@
+"""Signed distance of closed shapes against closed forms, and the refusal of others."""
+
+import numpy as np
+import pytest
+
+from core import InputError, Settings, reconstruct
+from tests import shapes
+
+
+def signed(points, **settings):
+    return reconstruct(points, Settings(**{"resolution": 48, "surface": "signed", **settings}))
+
+
+def hollow():
+    return np.concatenate([shapes.sphere(2000), shapes.sphere(700, 0.5)])
+
+
+def pair():
+    return np.concatenate([shapes.sphere(1000), shapes.sphere(1000) + [2.5, 0, 0]])
+
+
+# points, signed distance, Euler characteristic and volume of the pieces
+SHAPES = {
+    "sphere": (shapes.sphere(1500), lambda x: np.linalg.norm(x, axis=1) - 1, [2], [4 / 3 * np.pi]),
+    "scattered": (shapes.scattered_sphere(1500), lambda x: np.linalg.norm(x, axis=1) - 1, [2], [4 / 3 * np.pi]),
+    "torus": (
+        shapes.torus(2000),
+        lambda x: np.hypot(np.hypot(x[:, 0], x[:, 1]) - 1, x[:, 2]) - 0.4,
+        [0],
+        [2 * np.pi**2 * 0.16],
+    ),
+    "cube": (
+        shapes.cube(2400),
+        lambda x: np.linalg.norm(np.maximum(np.abs(x) - 1, 0), axis=1) + np.minimum(np.abs(x).max(axis=1) - 1, 0),
+        [2],
+        [8.0],
+    ),
+    "hollow": (
+        hollow(),
+        lambda x: np.maximum(np.linalg.norm(x, axis=1) - 1, 0.5 - np.linalg.norm(x, axis=1)),
+        [2, 2],
+        [4 / 3 * np.pi, -4 / 3 * np.pi / 8],
+    ),
+    "pair": (
+        pair(),
+        lambda x: np.minimum(np.linalg.norm(x, axis=1), np.linalg.norm(x - [2.5, 0, 0], axis=1)) - 1,
+        [2, 2],
+        [4 / 3 * np.pi] * 2,
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {name: signed(points) for name, (points, *_) in SHAPES.items()}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_values_are_negative_inside_and_right(runs, name):
+    field = runs[name].field
+    true = SHAPES[name][1](shapes.node_positions(field))
+    off = np.abs(field.values.ravel() - true) / field.spacing
+    clear = np.abs(true) > 0.3 * field.spacing
+    assert field.sdf
+    assert ((field.values.ravel() < 0) == (true < 0))[clear].all()
+    assert off.mean() < 0.1
+    assert np.percentile(off, 99) < 0.6
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_mesh_is_closed_and_faces_outwards(runs, name):
+    _, _, euler, volume = SHAPES[name]
+    surface = runs[name].surface
+    pieces = shapes.components(surface)
+    assert set(surface.edge_counts()[1]) == {2}
+    assert [shapes.euler(piece) for piece in pieces] == euler
+    assert [shapes.signed_volume(piece) for piece in pieces] == pytest.approx(volume, rel=0.05)
+    assert runs[name].sheet is None
+    assert runs[name].report["warnings"] == []
+    assert list(runs[name].report["meshes"]) == ["signed"]
+
+
+@pytest.mark.parametrize(("name", "hair"), [("sphere", 0.02), ("torus", 0.02), ("scattered", 0.15)])
+def test_vertices_lie_on_the_surface(runs, name, hair):
+    off = np.abs(SHAPES[name][1](runs[name].surface.vertices)) / runs[name].report["spacing"]
+    assert off.max() < hair
+
+
+@pytest.mark.parametrize("shape", ["hemisphere", "disc", "cylinder", "moebius", "junction"])
+def test_an_open_shape_is_refused_with_the_reason_and_a_place(shape):
+    points = getattr(shapes, shape)(1500) * 10 + 100
+    with pytest.raises(InputError, match=r"not closed: .* \d+ border samples.*surface='single'.*bridge \(now 3\)") as told:
+        signed(points)
+    assert "\n" not in str(told.value)
+    place = np.array(str(told.value).split("near (")[1].split(")")[0].split(","), float)
+    assert np.linalg.norm(points - place, axis=1).min() < 1e-3
+
+
+def test_raising_bridge_closes_a_hole():
+    points = shapes.sphere(2000)
+    points = points[points[:, 2] < 0.98]
+    with pytest.raises(InputError, match="raise bridge"):
+        signed(points, bridge=1.5)
+    run = signed(points, bridge=10.0)
+    assert shapes.euler(run.surface) == 2
+    assert shapes.signed_volume(run.surface) == pytest.approx(4 / 3 * np.pi, rel=0.02)
+
+
+def test_a_wall_inside_is_refused():
+    with pytest.raises(InputError, match="inner walls.*surface='single'"):
+        signed(np.concatenate([shapes.cube(2400), shapes.square(400)]))
+
+
+def test_a_flap_is_left_out_and_told():
+    run = signed(np.concatenate([shapes.sphere(1500), shapes.disc(300, 0.4) + [0, 0, 1.6]]))
+    assert shapes.signed_volume(run.surface) == pytest.approx(4 / 3 * np.pi, rel=0.02)
+    assert [warning for warning in run.report["warnings"] if "same side on both faces" in warning]
+
+
+def test_same_points_same_bytes(runs):
+    again = signed(shapes.sphere(1500))
+    assert again.field.values.tobytes() == runs["sphere"].field.values.tobytes()
+    assert again.surface.vertices.tobytes() == runs["sphere"].surface.vertices.tobytes()
+    assert again.surface.faces.tobytes() == runs["sphere"].surface.faces.tobytes()
+
+
+def test_distances_are_those_of_the_unsigned_field(runs):
+    plain = reconstruct(shapes.sphere(1500), Settings(resolution=48, surface="none")).field
+    np.testing.assert_array_equal(np.abs(runs["sphere"].field.values), plain.values)
+    assert not plain.sdf

@@ -1,0 +1,178 @@
+"""The single layer by topology, closed form and repetition. Resolutions are those of the shared runs."""
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core import Settings, reconstruct
+from core.points import local_spacing
+from tests import shapes
+
+
+def single(points, **settings):
+    return reconstruct(points, Settings(**{"resolution": 48, "surface": "single", **settings}))
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {
+        "sphere": single(shapes.sphere(1500)),
+        "torus": single(shapes.torus(2000)),
+        "cube": single(shapes.cube(2400)),
+        "disc": single(shapes.disc(800)),
+        "hemisphere": single(shapes.hemisphere(1500)),
+        "cylinder": single(shapes.cylinder(1500)),
+        "moebius": single(shapes.moebius(1500), resolution=64),
+        "sheets": single(shapes.sheets(2000, gap=0.2)),
+    }
+
+
+# Euler characteristic of each piece, largest first, and border loops
+TOPOLOGY = {
+    "sphere": ([2], 0),
+    "torus": ([0], 0),
+    "cube": ([2], 0),
+    "disc": ([1], 1),
+    "hemisphere": ([1], 1),
+    "cylinder": ([0], 2),
+    "moebius": ([0], 1),
+    "sheets": ([1, 1], 2),
+}
+
+
+@pytest.mark.parametrize("name", TOPOLOGY)
+def test_topology(runs, name):
+    sheet = runs[name].sheet
+    assert ([shapes.euler(piece) for piece in shapes.components(sheet)], sheet.border_loops()) == TOPOLOGY[name]
+    assert sheet.edge_counts()[1].max() == 2
+
+
+@pytest.mark.parametrize("name", TOPOLOGY)
+def test_is_the_sheet_and_no_cover(runs, name):
+    assert runs[name].surface is None
+    assert not runs[name].field.sdf
+    assert runs[name].field.values.min() >= 0
+
+
+@pytest.mark.parametrize("name", TOPOLOGY)
+def test_faces_are_distinct_and_use_every_vertex(runs, name):
+    sheet = runs[name].sheet
+    corners = np.sort(sheet.faces, axis=1)
+    assert (np.diff(corners, axis=1) > 0).all()
+    assert len(np.unique(corners, axis=0)) == len(corners)
+    np.testing.assert_array_equal(np.unique(sheet.faces), np.arange(len(sheet.vertices)))
+
+
+@pytest.mark.parametrize("name", [name for name in TOPOLOGY if name != "moebius"])
+def test_is_wound_alike(runs, name):
+    assert backward_edges(runs[name].sheet) == 0
+    assert runs[name].report["warnings"] == []
+
+
+def test_a_moebius_band_is_told_to_be_one_sided(runs):
+    cut = backward_edges(runs["moebius"].sheet)
+    assert 0 < cut < 60  # once across the band
+    assert any(f"across {cut} of its edges" in warning for warning in runs["moebius"].report["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("name", "volume"), [("sphere", 4 / 3 * np.pi), ("torus", 2 * np.pi**2 * 0.4**2), ("cube", 8.0)]
+)
+def test_closed_shapes_face_outwards(runs, name, volume):
+    assert shapes.signed_volume(runs[name].sheet) == pytest.approx(volume, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "area"),
+    [("sphere", 4 * np.pi), ("torus", 4 * np.pi**2 * 0.4), ("cube", 24), ("disc", np.pi), ("hemisphere", 2 * np.pi),
+     ("cylinder", 4 * np.pi), ("sheets", 8)],
+)  # fmt: skip
+def test_covers_the_surface_once(runs, name, area):
+    assert runs[name].sheet.face_areas().sum() == pytest.approx(area, rel=0.06)
+
+
+@pytest.mark.parametrize("name", TOPOLOGY)
+def test_every_sample_is_covered(runs, name):
+    run = runs[name]
+    distance, _ = KDTree(run.sheet.vertices).query(run.points)
+    assert distance.max() < 1.5 * run.field.spacing
+
+
+@pytest.mark.parametrize(
+    ("name", "true", "hair"),
+    [
+        ("sphere", shapes.sphere_distance, 0.02),
+        ("torus", shapes.torus_distance, 0.02),
+        ("hemisphere", shapes.hemisphere_distance, 0.6),
+        ("disc", shapes.disc_distance, 0.5),
+        ("cylinder", shapes.cylinder_distance, 0.5),
+    ],
+)
+def test_vertices_lie_on_the_surface(runs, name, true, hair):
+    """In local spacings: a fiftieth of one, but at rims half of one, because there the sheet's end is a guess."""
+    off = true(runs[name].sheet.vertices) / runs[name].report["spacing"]
+    assert np.percentile(off, 85) < 0.02
+    assert off.max() < hair
+
+
+def test_two_sheets_keep_their_heights(runs):
+    pieces = shapes.components(runs["sheets"].sheet)
+    assert sorted(round(float(np.median(piece.vertices[:, 2])), 3) for piece in pieces) == [-0.1, 0.1]
+
+
+def test_sheets_of_a_junction_are_joined_along_their_line_only():
+    """Not all along it: where a wall's last crossings are nearer to the floor it ends within a cell of it."""
+    run = single(shapes.junction(2000))
+    edges, counts = run.sheet.edge_counts()
+    middle = run.sheet.vertices[edges[counts > 2]].mean(axis=1)
+    assert len(middle) > 0
+    assert np.hypot(middle[:, 0], middle[:, 2]).max() < 2 * run.field.spacing
+    assert len(shapes.components(run.sheet)[0].faces) == len(run.sheet.faces)
+    wall = run.sheet.vertices[run.sheet.vertices[:, 2] > 0.1 * run.field.spacing]
+    seam = np.column_stack([np.zeros(50), np.linspace(-0.9, 0.9, 50), np.zeros(50)])
+    assert KDTree(wall).query(seam)[0].max() < 2 * run.field.spacing
+
+
+@pytest.mark.parametrize(("bridge", "loops"), [(3.0, 2), (8.0, 1)])
+def test_a_hole_narrower_than_bridge_closes_and_a_wider_one_stays_open(bridge, loops):
+    points = shapes.holed_square(1000, radius=0.16)
+    assert 3.0 < 0.32 / np.median(local_spacing(points)) < 8.0
+    assert single(points, bridge=bridge).sheet.border_loops() == loops
+
+
+def test_no_pinholes_at_random_voids():
+    sheet = single(shapes.scattered_sphere(1500)).sheet
+    assert set(sheet.edge_counts()[1]) == {2}
+    assert shapes.euler(sheet) == 2
+
+
+def test_a_flap_on_a_closed_shape_is_not_lost():
+    flap = shapes.disc(300, 0.4) + [0, 0, 1.6]
+    pieces = shapes.components(single(np.concatenate([shapes.sphere(1500), flap])).sheet)
+    assert [shapes.euler(piece) for piece in pieces] == [2, 1]
+
+
+def test_same_points_same_bytes(runs):
+    again = single(shapes.disc(800)).sheet
+    assert again.vertices.tobytes() == runs["disc"].sheet.vertices.tobytes()
+    assert again.faces.tobytes() == runs["disc"].sheet.faces.tobytes()
+
+
+def test_is_in_input_units_and_place():
+    """A power of two and a shift that doubles hold: the same mesh, moved."""
+    points, shift = np.rint(shapes.hemisphere(1500) * 2**16) / 2**16, [4096, -8192, 0]
+    sheet, moved = single(points).sheet, single(points * 1024 + shift).sheet
+    np.testing.assert_array_equal(moved.faces, sheet.faces)
+    np.testing.assert_allclose(moved.vertices, sheet.vertices * 1024 + shift, atol=1e-6)
+
+
+def test_both_gives_both(runs):
+    run = reconstruct(shapes.disc(800), Settings(resolution=48, surface="both"))
+    np.testing.assert_array_equal(run.sheet.vertices, runs["disc"].sheet.vertices)
+    assert set(run.surface.edge_counts()[1]) == {2}
+
+
+def backward_edges(mesh):
+    """Edges that both their faces run through in the same direction."""
+    directed = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    return len(directed) - len(np.unique(directed, axis=0))

@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from core import Mesh
+from core.surface.triangles import triangles
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+
+
+def test_triangles_come_back():
+    faces = np.array([[0, 1, 2]])
+    assert triangles(SQUARE, faces) is faces
+
+
+@pytest.mark.parametrize(("corner", "diagonal"), [(0, {0, 2}), (1, {1, 3}), (2, {0, 2}), (3, {1, 3})])
+def test_the_shorter_diagonal_splits_a_quad(corner, diagonal):
+    vertices = SQUARE.copy()
+    vertices[corner] += 0.4 * (0.5 - vertices[corner])
+    faces = triangles(vertices, np.array([[0, 1, 2, 3]]))
+    assert set.intersection(*map(set, faces.tolist())) == diagonal
+
+
+def test_area_and_winding_stay():
+    faces = triangles(SQUARE, np.array([[0, 1, 2, 3]]))
+    a, b, c = (SQUARE[faces[:, k]] for k in range(3))
+    np.testing.assert_allclose(np.cross(b - a, c - a)[:, 2], [1, 1])
+
+
+def test_a_diagonal_is_never_an_edge_that_is_there_already():
+    """Two quads with an edge of the second along the shorter diagonal of the first."""
+    vertices = np.concatenate([SQUARE * [1, 0.9, 1] + [0.05, 0, 0], [[0, 0, 1], [1, 1, 1]]])
+    vertices[1] += [0.3, -0.3, 0]  # makes 0-2 the shorter
+    mesh = Mesh(vertices, triangles(vertices, np.array([[0, 1, 2, 3], [0, 2, 5, 4]])))
+    assert mesh.edge_counts()[1].max() <= 2
+
+
+def test_two_quads_on_the_same_corners_get_both_diagonals():
+    """A flat pocket: closed, and still with two faces at each edge."""
+    mesh = Mesh(SQUARE, triangles(SQUARE, np.array([[0, 1, 2, 3], [3, 2, 1, 0]])))
+    assert set(mesh.edge_counts()[1]) == {2}

@@ -1,0 +1,96 @@
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from core import Settings, VADError, reconstruct
+from core.budget import Estimate, check_budget, estimate_cost, free_memory_mb
+from core.cli import main
+from core.errors import MemoryBudgetError
+from core.field.grid import fit_grid
+from core.points import local_spacing
+from tests import shapes
+
+POINTS = shapes.sphere(1500)
+
+
+def cost(points, resolution):
+    grid = fit_grid(points, resolution)
+    return estimate_cost(local_spacing(points), grid), grid
+
+
+def test_more_points_and_finer_grids_cost_more():
+    small, fine, many = cost(POINTS, 64)[0], cost(POINTS, 256)[0], cost(shapes.sphere(60_000), 64)[0]
+    for dear in (fine, many):
+        assert dear.seconds > 1.5 * small.seconds
+        assert dear.memory_mb > 1.5 * small.memory_mb
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak of a child process is read from /proc")
+@pytest.mark.parametrize(("samples", "resolution"), [(2000, 192), (30_000, 64)])
+def test_memory_is_what_a_run_takes_within_two_fifths(samples, resolution):
+    script = (
+        "from core import Settings, reconstruct; from core.memory import peak_memory_mb; from tests import shapes;"
+        f"points = shapes.sphere({samples}); before = peak_memory_mb();"
+        f"result = reconstruct(points, Settings(resolution={resolution}));"
+        "print(result.report['estimate']['memory_mb'], peak_memory_mb() - before)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=os.getcwd())
+    estimated, taken = map(float, done.stdout.split())
+    assert taken / 1.4 < estimated < 1.4 * taken
+
+
+def test_the_message_names_the_need_the_limit_and_a_resolution_that_fits():
+    with pytest.raises(MemoryBudgetError) as caught:
+        reconstruct(POINTS, Settings(resolution=256, memory_limit=300))
+    message = str(caught.value)
+    assert isinstance(caught.value, VADError)
+    assert "resolution 256" in message
+    assert "300 MiB" in message
+    fitting = int(message.split("use resolution ")[1].split()[0])
+    assert cost(POINTS, fitting)[0].memory_mb <= 300 < cost(POINTS, fitting + 8)[0].memory_mb
+    assert reconstruct(POINTS, Settings(resolution=32, memory_limit=300, surface="none")).field.values.size
+
+
+def test_too_many_points_for_any_grid_are_named():
+    _, grid = cost(POINTS, 64)
+    with pytest.raises(MemoryBudgetError, match=r"thin the 10000000 points to [0-9]+ or fewer"):
+        check_budget(Estimate(1.0, 50_000.0), 10_000_000, grid, Settings(resolution=64, memory_limit=1000))
+
+
+def test_auto_is_seven_tenths_of_what_is_free(monkeypatch):
+    estimate, grid = cost(POINTS, 64)
+    monkeypatch.setattr("core.budget.free_memory_mb", lambda: estimate.memory_mb / 0.7 * 1.01)
+    check_budget(estimate, 1500, grid, Settings(resolution=64))
+    monkeypatch.setattr("core.budget.free_memory_mb", lambda: estimate.memory_mb / 0.7 * 0.99)
+    with pytest.raises(MemoryBudgetError):
+        check_budget(estimate, 1500, grid, Settings(resolution=64))
+
+
+def test_free_memory_is_a_part_of_what_there_is():
+    assert 10 < free_memory_mb() < 2**24
+
+
+def test_the_command_line_ends_with_status_3_and_writes_nothing(tmp_path, capsys):
+    np.save(tmp_path / "ball.npy", POINTS)
+    arguments = [
+        "reconstruct",
+        tmp_path / "ball.npy",
+        "-o",
+        tmp_path / "out",
+        "--resolution",
+        300,
+        "--memory-limit",
+        200,
+    ]
+    assert main([str(argument) for argument in arguments]) == 3
+    assert "use resolution" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
+
+
+def test_info_tells_both(tmp_path, capsys):
+    np.save(tmp_path / "ball.npy", POINTS)
+    assert main(["info", str(tmp_path / "ball.npy"), "--resolution", "96"]) == 0
+    assert " s and " in capsys.readouterr().out.splitlines()[-1]

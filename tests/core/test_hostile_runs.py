@@ -1,0 +1,95 @@
+"""Runs that are stopped, killed or given another number of threads."""
+
+import hashlib
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core import Cancelled, Settings, reconstruct
+from tests import shapes
+
+ROOT = Path(__file__).parents[2]
+DIGEST = """
+import hashlib, sys, numpy as np
+from core import Settings, reconstruct
+result = reconstruct(np.load(sys.argv[1]), Settings(resolution=40))
+arrays = result.points, result.normals, result.confidence, result.field.values
+arrays += result.surface.vertices, result.surface.faces
+print(hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest())
+"""
+
+
+def noisy_sphere(n, deviation=0.02):
+    return shapes.scattered_sphere(n) + np.random.default_rng(7).normal(size=(n, 3)) * deviation
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.03])
+def test_the_number_of_threads_changes_no_byte(tmp_path, deviation):
+    np.save(tmp_path / "points.npy", noisy_sphere(3000, deviation))
+    digests = set()
+    for threads in ("1", "2", "5"):
+        limits = dict.fromkeys(
+            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "TBB_NUM_THREADS"), threads
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", DIGEST, tmp_path / "points.npy"],
+            cwd=ROOT, env=os.environ | limits, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        digests.add(done.stdout)
+    assert len(digests) == 1
+
+
+@pytest.mark.parametrize("deviation", [0.0, 0.02])
+def test_a_run_can_be_stopped_within_a_second_anywhere(deviation):
+    """The longest silence between two looks at `progress`."""
+    calls = []
+
+    def look(fraction, text):
+        calls.append((time.perf_counter(), text))
+
+    reconstruct(noisy_sphere(10_000, deviation), Settings(resolution=96), progress=look)
+    silences = [(after - before, text) for (before, text), (after, _) in pairwise(calls)]
+    assert max(silences)[0] < 2.0, max(silences)  # a second, and as much again for a busy machine
+
+
+def test_a_stopped_run_leaves_no_thread_and_no_process():
+    before = threading.active_count()
+    with pytest.raises(Cancelled):
+        reconstruct(noisy_sphere(2000), Settings(resolution=48), progress=lambda fraction, text: fraction < 0.6)
+    assert threading.active_count() == before
+    assert not multiprocessing.active_children()
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="no kill -9 here")
+def test_kill_at_any_moment_leaves_earlier_output_whole(tmp_path):
+    scan, out = tmp_path / "ball.npy", tmp_path / "out"
+    np.save(scan, shapes.sphere(800))
+    command = [sys.executable, "-m", "core", "reconstruct", str(scan), "-o", str(out), "--resolution", "32"]
+    start = time.perf_counter()
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    length = time.perf_counter() - start
+    whole = digests(out)
+    chance = random.Random(0)
+    for _ in range(8):
+        run = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(chance.uniform(0.5, 1.0) * length)
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        after = digests(out)
+        assert {name: after[name] for name in whole if name != "ball.json"} == {
+            name: digest for name, digest in whole.items() if name != "ball.json"
+        }
+
+
+def digests(folder):
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()}
