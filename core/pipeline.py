@@ -17,12 +17,7 @@ from .points import local_spacing, prepare_samples
 from .progress import Progress
 from .reconstruction import Reconstruction
 from .settings import Settings
-from .surface.crossings import find_crossings
-from .surface.double_cover import double_cover
-from .surface.mesh import Mesh
-from .surface.sides import find_sides
-from .surface.signed import signed_distance, signed_mesh
-from .surface.single_layer import single_layer
+from .surface.extract import extract_surfaces
 
 
 def reconstruct(points, settings: Settings = Settings(), constraints=None, progress=None) -> Reconstruction:
@@ -42,8 +37,8 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
     >>> abs(result.field.sample([[0, 0, 1.5]])[0] - 0.5) < 0.01
     True
 
-    Raises :class:`InputError` for points or constraints that cannot be used and for the signed surface of a shape that is
-    not closed, :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled`
+    Raises :class:`InputError` for points or constraints that cannot be used and for the signed surface of a shape that
+    is not closed, :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled`
     where `progress` says so.
     """
     progress, stages = Progress.of(progress), _Stages()
@@ -68,36 +63,10 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge)
         values, band = distance_field(local, grid, settings.integration, progress.part(0.2, 0.8, "distance field"))
 
-    surface = sheet = None
-    signed = settings.surface == "signed"
-    unoriented = 0
     with stages("surface"):
-        if settings.surface in ("double", "both"):
-            surface = double_cover(values, local, grid, settings.offset, progress.part(0.8, 0.85, "double cover"))
-            surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
-        if settings.surface in ("single", "both", "signed"):
-            crossings = find_crossings(band, local, grid, progress.part(0.85, 0.92, "crossings"))
-            sides = find_sides(values, crossings, local, grid)
-        if settings.surface in ("single", "both"):
-            part = progress.part(0.92, 1.0, "single layer")
-            sheet, unoriented = single_layer(values, crossings, sides, local, grid, part)
-            sheet = Mesh(samples.to_input_units(sheet.vertices), sheet.faces)
-        if signed:
-            values = signed_distance(values, sides, local, samples.to_input_units)
-            surface = signed_mesh(values, local, grid, progress.part(0.92, 1.0, "signed surface"))
-            surface = Mesh(samples.to_input_units(surface.vertices), surface.faces)
+        part = progress.part(0.8, 1.0)
+        surfaces = extract_surfaces(values, band, local, grid, settings, samples.to_input_units, part)
 
-    warnings = list(samples.warnings)
-    if unoriented:
-        warnings.append(
-            f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided there, "
-            "or sheets meet; use the double cover where both sides must show"
-        )
-    if signed and not sides.complete:
-        warnings.append(
-            f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls) and is not in the "
-            f"signed surface, which spans openings of {sides.spanned:.1%} of its area; compare it with the single layer"
-        )
     report = {
         "settings": asdict(settings),
         "counts": {
@@ -110,16 +79,15 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         },
         "cleaning": cleaning,
         "meshes": {
-            name: {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": mesh.border_loops()}
-            for name, mesh in (("signed" if signed else "double", surface), ("single", sheet))
-            if mesh is not None
+            kind: {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": mesh.border_loops()}
+            for kind, mesh in surfaces.meshes.items()
         },
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
         "spacing": float(np.median(spacing)) * samples.scale,
         "seconds": stages.seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": warnings,
+        "warnings": [*samples.warnings, *surfaces.warnings],
     }
     progress(1.0)
     return Reconstruction(
@@ -128,13 +96,13 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         normals=normals,
         confidence=confidence,
         field=DistanceField(
-            values * np.float32(samples.scale),
+            surfaces.values * np.float32(samples.scale),
             samples.to_input_units(grid.origin),
             grid.spacing * samples.scale,
-            sdf=signed,
+            sdf="signed" in surfaces.meshes,
         ),
-        surface=surface,
-        sheet=sheet,
+        surface=surfaces.meshes.get("double", surfaces.meshes.get("signed")),
+        sheet=surfaces.meshes.get("single"),
         near=NearBand(band.node, band.step * samples.scale),
         report=report,
     )

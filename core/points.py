@@ -42,9 +42,13 @@ class Samples:
         return _framed(self.given[kept], self.source_index[kept], (*self.warnings, warning))
 
     def moved(self, points: np.ndarray) -> "Samples":
-        """The same samples at new places (n,3) of the unit frame; those that did not move stay exactly as given."""
+        """The samples at new places (n,3) of the unit frame, one of each that fell together; those that did not move
+        stay exactly as given."""
         stirred = (points != self.points).any(axis=1)[:, None]
-        return replace(self, points=points, given=np.where(stirred, self.to_input_units(points), self.given))
+        points = np.rint(points / _QUANTUM) * _QUANTUM
+        kept = _first_of_each(points, np.arange(len(points)))
+        given = np.where(stirred, self.to_input_units(points), self.given)
+        return replace(self, points=points[kept], given=given[kept], source_index=self.source_index[kept])
 
 
 def prepare_samples(points) -> Samples:

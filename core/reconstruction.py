@@ -18,8 +18,8 @@ class Reconstruction:
     normals      : (n',3) float64 unit axes; the sign carries no meaning
     confidence   : (n',) float64 in [0,1], how well the neighbours agree on the axis
     field        : DistanceField, signed where the setting `surface` is "signed"
-    surface      : Mesh, closed: the double cover, or where the setting `surface` is "signed" the boundary of the inside,
-                   wound outwards; None where it is "single" or "none"
+    surface      : Mesh, closed: the double cover, or where the setting `surface` is "signed" the boundary of the
+                   inside, wound outwards; None where it is "single" or "none"
     sheet        : Mesh, the single layer, where the setting `surface` is "single" or "both"; else None
     near         : NearBand, the nodes near the surface and the steps to them from their foot points
     report       : dict, JSON-ready: settings, counts, seconds per stage, peak memory, warnings

@@ -99,7 +99,7 @@ class Settings:
 
 
 def options() -> dict[str, dataclasses.Field]:
-    """Name -> field of every setting, with its `.default`, `.type` and `.metadata` (help, limits, choices, word, unit)."""
+    """Name -> field of each setting: its `.default`, `.type` and `.metadata` (help, limits, choices, word, unit)."""
     return {option.name: option for option in dataclasses.fields(Settings)}
 
 

@@ -76,7 +76,9 @@ def moebius(n: int, width: float = 0.6) -> np.ndarray:
 def cube(n: int) -> np.ndarray:
     """The six faces of [-1, 1]^3."""
     face = square(n // 6)
-    return np.concatenate([np.roll(face + [0, 0, side], axis, axis=1) for axis in range(3) for side in (-1, 1)])
+    return np.concatenate(
+        [np.roll(face + np.array([0, 0, side]), axis, axis=1) for axis in range(3) for side in (-1, 1)]
+    )
 
 
 def junction(n: int) -> np.ndarray:

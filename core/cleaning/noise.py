@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..normals.estimate import estimate_normals
 from ..progress import Progress
 from .quadrics import fit_quadrics
 
@@ -24,6 +25,7 @@ _UNEVEN = 2.0  # a region's noise counts as at most this many times the median: 
 _EVERYWHERE = 0.04  # local spacings: nine tenths of the regions of a noisy cloud are above it
 _LEVEL = 0.05  # local spacings: half of them are above this
 _GROWTH = 1.15  # from 12 to 20 neighbours noise hardly grows, detail that the samples miss does
+_AGREED = 0.96  # median confidence of normals that noise of a tenth of a local spacing does not reach
 _DROWNED = 0.3  # local spacings: above it 12 neighbours see too little of the noise for that comparison
 
 
@@ -43,7 +45,8 @@ def is_noisy(points, spacing, seed: int = 0) -> bool:
     """Whether samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
 
     Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise is everywhere
-    and looks alike from 12 and from 20 neighbours; creases, close sheets and unresolved detail are in places, or grow.
+    and looks alike from 12 and from 20 neighbours; creases and unresolved detail are in places, or grow. Sheets closer
+    than their samples look like noise to the quadrics, but normals agree from sample to sample there as noise lets none.
     """
     if len(points) < MINIMUM_SAMPLES:
         return False
@@ -52,7 +55,10 @@ def is_noisy(points, spacing, seed: int = 0) -> bool:
     relative = wide / np.median(spacing[anchors][region], axis=1)
     growth = np.median(wide / np.maximum(fine, np.finfo(float).tiny))
     everywhere, level = np.percentile(relative, (10, 50))
-    return bool(everywhere > _EVERYWHERE and level > _LEVEL and (growth < _GROWTH or level > _DROWNED))
+    if everywhere <= _EVERYWHERE or level <= _LEVEL or (growth >= _GROWTH and level <= _DROWNED):
+        return False
+    _, confidence, _ = estimate_normals(points, spacing)
+    return bool(np.median(confidence) < _AGREED)
 
 
 def estimate_noise(points, seed: int = 0, progress=None) -> Noise:

@@ -30,6 +30,7 @@ _DETACHED = 4.0  # a gap this many times the local spacing on either side separa
 _SMALL_PART = 0.02  # of all samples
 
 _DIRTY = 0.005  # share of strays from which on those close to the surface are looked for as well
+_STRICT = 0.7  # share of the limits above that then holds for those beside a surface
 _FITTED = 20  # neighbours of the quadrics that those are measured against
 _HOVERING = 6.0  # distance from the quadric over the median one around
 _HOVERING_FAR = 0.3  # and over the local spacing
@@ -51,8 +52,9 @@ def find_outliers(points, progress=None) -> np.ndarray:
         progress(turn / _ROUNDS)
         kept = np.flatnonzero(~stray)
         around = _Surroundings(points[kept])
-        found = around.beside() | around.scattered() | around.detached()
-        if stray.sum() > _DIRTY * len(points):
+        dirty = stray.sum() > _DIRTY * len(points)
+        found = around.beside(_STRICT if dirty else 1.0) | around.scattered() | around.detached()
+        if dirty:
             found |= around.hovering()
         stray[kept[found]] = True
         if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
@@ -80,9 +82,9 @@ class _Surroundings:
         self.lonely = self.spacing / theirs
         self.off = np.abs(np.einsum("ni,ni->n", points - centre, axes[:, :, 0])) / theirs
 
-    def beside(self):
-        off_plane = (self.lonely > _LONELY) & (self.off > _OFF)
-        return (off_plane | (self.lonely > _ALONE)) & ~self.wire
+    def beside(self, share):
+        off_plane = (self.lonely > share * _LONELY) & (self.off > share * _OFF)
+        return (off_plane | (self.lonely > share * _ALONE)) & ~self.wire
 
     def scattered(self):
         found = np.zeros(len(self.points), bool)

@@ -35,11 +35,9 @@ def mend(node, axis, crossed, certainty, strides) -> None:
 
 
 def _faces(node, axis, size, strides):
-    """Distinct keys of grid faces, direction across * size + lowest node, and which are the four at each edge, (e,4)."""
+    """Distinct keys of grid faces, direction across * size + lowest node, and which four are at each edge, (e,4)."""
     sides = [(axis + 1) % 3, (axis + 2) % 3]
-    faces = [
-        across * size + node - back * strides[along] for along, across in (sides, sides[::-1]) for back in (0, 1)
-    ]
+    faces = [across * size + node - back * strides[along] for along, across in (sides, sides[::-1]) for back in (0, 1)]
     key, index = np.unique(np.stack(faces, axis=1), return_inverse=True)
     return key, index.reshape(-1, 4)
 

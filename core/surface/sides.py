@@ -6,8 +6,8 @@ the label spreads over the grid, where each node decides with all its neighbours
 
 Nodes far from the surface fall into regions, of which the one at the box is outside. Between them, the side s of each
 node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the surface and of (s_a + s_b)^2 over those
-that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Nested shells so get alternating sides:
-a hollow ball is inside between its walls, and outside within.
+that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Nested shells so get alternating
+sides: a hollow ball is inside between its walls, and outside within.
 """
 
 from dataclasses import dataclass

@@ -70,8 +70,8 @@ def _refusal(sides, surface, place):
     widest = np.where(border, surface.rims.opening, np.inf).argmin()
     return (
         f"the shape is not closed: the outside reaches both faces of {sides.share:.0%} of its surface, past "
-        f"{border.sum()} border samples, for instance near {_text(place(surface.points[[widest]])[0])}; ask for surface='single', or "
-        f"raise bridge (now {surface.bridge:g}) until its holes close"
+        f"{border.sum()} border samples, for instance near {_text(place(surface.points[[widest]])[0])}; ask for "
+        f"surface='single', or raise bridge (now {surface.bridge:g}) until its holes close"
     )
 
 

@@ -10,8 +10,8 @@ from .holes import fill_pinholes
 from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
-from .signed import signed_mesh
 from .sides import Sides
+from .signed import signed_mesh
 from .triangles import triangles
 
 _ROUNDS = 2

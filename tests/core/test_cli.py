@@ -49,8 +49,8 @@ def calls(monkeypatch):
             np.arange(4),
             np.eye(4, 3),
             np.ones(4),
-            DistanceField(np.ones((4, 4, 4), np.float32), np.zeros(3), 0.25),
-            mesh if settings.surface in ("double", "both") else None,
+            DistanceField(np.ones((4, 4, 4), np.float32), np.zeros(3), 0.25, sdf=settings.surface == "signed"),
+            mesh if settings.surface in ("double", "both", "signed") else None,
             mesh if settings.surface in ("single", "both") else None,
             NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]])),
             REPORT,
@@ -101,6 +101,27 @@ def test_json_is_all_there_is_on_stdout_and_equals_the_report_file(capsys, scan,
 def test_no_mesh_was_asked(capsys, scan, calls, tmp_path):
     run(capsys, "reconstruct", scan, "-o", tmp_path / "out", "--surface", "none")
     assert sorted(os.listdir(tmp_path / "out")) == ["ball.json", "ball.vdb", "ball_points.ply"]
+
+
+@pytest.mark.parametrize(
+    ("surface", "meshes"),
+    [("single", {"single"}), ("both", {"single", "double"}), ("signed", {"signed"})],
+)
+def test_each_mesh_has_a_file(capsys, scan, calls, tmp_path, surface, meshes):
+    run(capsys, "reconstruct", scan, "-o", tmp_path / "out", "--surface", surface)
+    assert set(os.listdir(tmp_path / "out")) == {
+        "ball.json", "ball.vdb", "ball_points.ply", *(f"ball_{mesh}.ply" for mesh in meshes)
+    }  # fmt: skip
+
+
+def test_arrays_on_request(capsys, scan, calls, tmp_path):
+    status, out, _ = run(capsys, "reconstruct", scan, "-o", tmp_path / "out", "--arrays", "--json")
+    assert status == 0
+    assert str(tmp_path / "out" / "ball.npz") in json.loads(out)["files"]
+    with np.load(tmp_path / "out" / "ball.npz", allow_pickle=False) as arrays:
+        np.testing.assert_array_equal(arrays["values"], np.ones((4, 4, 4)))
+        np.testing.assert_array_equal(arrays["node"], [[1, 1, 1], [1, 1, 2]])
+        np.testing.assert_allclose(arrays["direction"], [[0, 0, 1], [0, 0, 0]])
 
 
 def test_gradient_grid_on_request(capsys, scan, calls, tmp_path):

@@ -68,7 +68,7 @@ def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
     rng = np.random.default_rng(1)
     points, stray = with_strays(rng.normal(size=(60, 3)) * 0.05 + [2, 0, 0])
     np.testing.assert_array_equal(find_outliers(points), stray)
-    flat = np.column_stack([rng.uniform(-0.2, 0.2, (60, 2)), np.zeros(60)]) + [2, 0, 0]
+    flat = rng.uniform(-0.2, 0.2, (60, 3)) * [1, 1, 0] + [2, 0, 0]
     assert not find_outliers(with_strays(flat)[0]).any()
 
 

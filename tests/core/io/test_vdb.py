@@ -48,6 +48,18 @@ def test_udf_comes_back_exactly_in_its_place(openvdb, tmp_path, band):
         np.testing.assert_allclose(density.transform.indexToWorld(node), udf.transform.indexToWorld(node))
 
 
+def test_signed_distances_are_a_level_set_named_sdf(openvdb, tmp_path):
+    cells = np.indices(SHAPE)[0] - 9.5
+    field = DistanceField((cells * SPACING).astype(np.float32), ORIGIN, SPACING, sdf=True)
+    write_vdb(tmp_path / "field.vdb", field)
+    grids, _ = openvdb.readAll(str(tmp_path / "field.vdb"))
+    density, sdf = sorted(grids, key=lambda grid: grid.name)
+    assert (density.name, sdf.name) == ("density", "sdf")
+    assert sdf.gridClass == openvdb.GridClass.LEVEL_SET
+    np.testing.assert_array_equal(values(sdf), field.values)
+    np.testing.assert_allclose(values(density), np.clip(1 - np.abs(cells) / 2, 0, 1), atol=1e-6)
+
+
 def test_a_band_is_stored_sparse_and_a_dense_field_is_not(openvdb, tmp_path):
     counts = []
     for band in (2 * SPACING, np.inf):

@@ -101,7 +101,7 @@ def test_nothing_is_crossed_past_the_rim():
 def test_a_sheet_through_grid_nodes_is_one_plane_of_edges():
     """Every node of the plane takes the same side, so the sheet is flat and nothing in it is crossed."""
     plane = GRID.origin[2] + 13 * GRID.spacing
-    points = shapes.square(1500) + [0, 0, plane]
+    points = shapes.square(1500) + np.array([0, 0, plane])
     surface = local(points, np.tile([0.0, 0, 1], (len(points), 1)))
     noise = np.random.default_rng(0).normal(scale=1e-9, size=(np.prod(GRID.shape), 3))
     found = find_crossings(

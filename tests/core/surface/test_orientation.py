@@ -17,8 +17,9 @@ def band(n, twisted):
     """A strip of n quads round the unit circle, closed with or without half a twist."""
     turn = 2 * np.pi * np.arange(n) / n
     tilt = turn / 2 if twisted else np.full(n, 0.2)
-    rims = [np.stack([(1 + s * np.cos(tilt)) * np.cos(turn), (1 + s * np.cos(tilt)) * np.sin(turn), s * np.sin(tilt)], 1)
-            for s in (-0.3, 0.3)]  # fmt: skip
+    radii = [1 + side * np.cos(tilt) for side in (-0.3, 0.3)]
+    heights = [side * np.sin(tilt) for side in (-0.3, 0.3)]
+    rims = [np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1) for r, z in zip(radii, heights, strict=True)]
     low, high = np.arange(n), n + np.arange(n)
     after, above = np.roll(low, -1), np.roll(high, -1)
     if twisted:

@@ -147,7 +147,7 @@ def test_no_pinholes_at_random_voids():
 
 
 def test_a_flap_on_a_closed_shape_is_not_lost():
-    flap = shapes.disc(300, 0.4) + [0, 0, 1.6]
+    flap = shapes.disc(300, 0.4) + np.array([0, 0, 1.6])
     pieces = shapes.components(single(np.concatenate([shapes.sphere(1500), flap])).sheet)
     assert [shapes.euler(piece) for piece in pieces] == [2, 1]
 

@@ -1,0 +1,70 @@
+"""Stage three: the meshes that were asked for."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..field.grid import Grid
+from ..field.integration import NearBand
+from ..field.local_surface import LocalSurface
+from ..progress import Progress
+from ..settings import Settings
+from .crossings import find_crossings
+from .double_cover import double_cover
+from .mesh import Mesh
+from .sides import find_sides
+from .signed import signed_distance, signed_mesh
+from .single_layer import single_layer
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """What was extracted, in the units of the samples.
+
+    values   : (nx,ny,nz) float32, the distances, signed where a signed surface was asked for
+    meshes   : by kind: "double", "signed", "single"
+    warnings : where a mesh is less than was asked for, one line each
+    """
+
+    values: np.ndarray
+    meshes: dict[str, Mesh] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def placed(self, place) -> "Surfaces":
+        """The same with vertices taken to the user's units by the function `place`."""
+        return replace(self, meshes={kind: Mesh(place(m.vertices), m.faces) for kind, m in self.meshes.items()})
+
+
+def extract_surfaces(
+    values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
+) -> Surfaces:
+    """The meshes that `settings.surface` names, from distances `values` (nx,ny,nz) float32 and the band near it.
+
+    place : function that takes positions (m,3) to the user's units, for messages
+    Raises :class:`InputError` where a signed surface is asked for and the shape is not closed.
+    """
+    progress, kind = Progress.of(progress), settings.surface
+    meshes, warnings = {}, []
+    if kind in ("double", "both"):
+        meshes["double"] = double_cover(values, local, grid, settings.offset, progress.part(0.0, 0.3, "double cover"))
+    if kind in ("single", "both", "signed"):
+        crossings = find_crossings(band, local, grid, progress.part(0.3, 0.6, "crossings"))
+        sides = find_sides(values, crossings, local, grid)
+    if kind in ("single", "both"):
+        part = progress.part(0.6, 1.0, "single layer")
+        meshes["single"], unoriented = single_layer(values, crossings, sides, local, grid, part)
+        if unoriented:
+            warnings.append(
+                f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "
+                "there, or sheets meet; use the double cover where both sides must show"
+            )
+    if kind == "signed":
+        values = signed_distance(values, sides, local, place)
+        meshes["signed"] = signed_mesh(values, local, grid, progress.part(0.6, 1.0, "signed surface"))
+        if not sides.complete:
+            warnings.append(
+                f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls) and is not in "
+                f"the signed surface, which spans openings of {sides.spanned:.1%} of its area; compare it with the "
+                "single layer"
+            )
+    return Surfaces(values, meshes, tuple(warnings)).placed(place)
