@@ -15,18 +15,19 @@ TOWARDS_VIEWER = -0.05, -1.0, 0.1
 ACROSS_X = 0
 GUIDE = {
     ".png": "the scan, its normals, its distance field and its surface at a glance",
-    "_double.ply": "the surface: any mesh viewer; in Blender, File > Import > Stanford PLY",
+    "_double.ply": "the surface, two-sided: any mesh viewer; in Blender, File > Import > Stanford PLY",
     ".vdb": "the distance field: in Blender, Add > Volume > Import OpenVDB",
     "_points.ply": "the points with their normals: opens like the surface",
+    "_single.ply": "the same surface as one sheet, open where the scan is open",
 }
 
 
 def main() -> int:
-    status = command_line(["reconstruct", str(SCAN), "-o", str(OUTPUT)])
+    status = command_line(["reconstruct", str(SCAN), "-o", str(OUTPUT), "--surface", "both"])
     if status:
         return status
 
-    picture, mesh, volume, samples = (OUTPUT / f"{SCAN.stem}{ending}" for ending in GUIDE)
+    picture, mesh, volume, samples, _ = (OUTPUT / f"{SCAN.stem}{ending}" for ending in GUIDE)
     points, normals = read_points(samples)
     save_picture(picture, points, normals, read_field(volume), read_mesh(mesh), TOWARDS_VIEWER, ACROSS_X)
 

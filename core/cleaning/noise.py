@@ -46,7 +46,7 @@ def is_noisy(points, spacing, seed: int = 0) -> bool:
 
     Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise is everywhere
     and looks alike from 12 and from 20 neighbours; creases and unresolved detail are in places, or grow. Sheets closer
-    than their samples look like noise to the quadrics, but normals agree from sample to sample there as noise lets none.
+    than their samples look like noise to the quadrics, but normals agree there from sample to sample, as in no noise.
     """
     if len(points) < MINIMUM_SAMPLES:
         return False
