@@ -17,10 +17,10 @@ from .cases import load_case
 from .geometry import surface_points
 from .peers import Clock
 
-COUNTS = 1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000
+COUNTS = 1_000, 3_000, 10_000, 30_000, 100_000, 1_000_000
 REPEATED_UP_TO = 100_000  # points; larger runs are measured once
 _REPEATS = 3
-_GROWTH_FROM = 10_000  # below, fixed costs show
+_SMALL = 5_000  # points; up to here fixed costs show
 
 
 def costs(path: Path, counts=COUNTS) -> Iterator[dict]:
@@ -44,7 +44,7 @@ def stage_cost(path: Path, count: int) -> dict:
     peak = peak_memory_mb()
     alone = [_delaunay(points) for _ in range(repeats)]
     return {
-        "points": len(points),
+        "points": count,
         "stage_cpu": min(facets.cpu + sweeps.cpu for facets, sweeps in stages),
         "facets_cpu": min(facets.cpu for facets, _ in stages),
         "stage_seconds": min(facets.seconds + sweeps.seconds for facets, sweeps in stages),
@@ -70,5 +70,5 @@ def _delaunay(points):
 
 def exponent(measured: list[dict], key: str) -> float:
     """p of the power law count^p through the value `key` of the larger runs, by least squares of the logarithms."""
-    large = [(run["points"], run[key]) for run in measured if run["points"] >= 0.9 * _GROWTH_FROM]
+    large = [(run["points"], run[key]) for run in measured if run["points"] > _SMALL]
     return float(np.polyfit(*np.log(np.array(large)).T, 1)[0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.cleaning.clean import clean
 from core.linalg import outer, principal_axes
-from core.normals.adam import minimise
+from core.normals.adam import MAX_STEPS, minimise
 from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
 from core.normals.mirrors import Mirrors
 from core.normals.pca import pca_normals
@@ -25,14 +25,17 @@ from .metrics import normal_agreement
 from .peers import check_open3d
 
 PCA_NEIGHBOURS = range(6, 25)
+CLOSER_NEIGHBOURS = range(3, 6)
 PEER_NEIGHBOURS = 30
 DENSITIES = 3_000, 10_000
+ABLATION_STEPS = 100
+CURVE_STEPS = 150
 CURVE_SWEEPS = 20  # from then on the solver holds axes back, which this module does not repeat
 
 PRINTED = EnergyWeights(distance=1, gradient=1e-3, alignment=1e2)
 _FACTORS = [(1, 1, 1), (1, 1, 10), (1, 1, 0.1), (1, 10, 1), (1, 0.1, 1), (10, 1, 1), (0.1, 1, 1)]
 
-_DENSE, _FEW, _SOME = 30_000, 500, 10_000
+_DENSE, _FEW, _SOME = 20_000, 500, 10_000
 _NOISE = 0.005  # of the longest side
 _CONTRAST = 30  # between the densest and the thinnest end of the non-uniform input
 
@@ -72,9 +75,10 @@ class Problem:
     def sweeps(self, start=None) -> np.ndarray:
         return reflection_sweeps(self.points, self.samples.facets, start=start)[0]
 
-    def adam(self, energy: NormalEnergy, start=None) -> np.ndarray:
+    def adam(self, energy: NormalEnergy, start=None, max_steps=MAX_STEPS) -> np.ndarray:
         """Axes of least energy from the plane fit, or from `start`."""
-        return minimise(energy.value_and_gradient, self.mirrors.plane_fit() if start is None else start)[0]
+        start = self.mirrors.plane_fit() if start is None else start
+        return minimise(energy.value_and_gradient, start, max_steps=max_steps)[0]
 
     def random_start(self) -> np.ndarray:
         return random_axes(len(self.points), seed=0)
@@ -86,6 +90,7 @@ class Problem:
 def case_quality(path: Path, sampling: str) -> dict:
     """Agreement of every method on one case, and what the page derives from it.
 
+    closer_pca  : the best PCA over fewer neighbours than `pca` may take
     error_ratio : 1 - NC of the sweeps over that of the best PCA
     start_gap   : |NC of the sweeps from random axes - NC of the sweeps from the plane fit|
     distance_ratio : E_d of the sweeps over E_d of Adam
@@ -108,6 +113,7 @@ def case_quality(path: Path, sampling: str) -> dict:
         "category": case.meta["category"],
         "points": len(problem.points),
         **found,
+        "closer_pca": best_pca(problem, CLOSER_NEIGHBOURS),
         "error_ratio": (1 - found["sweeps"]["nc"]) / (1 - found["pca"]["nc"]),
         "start_gap": abs(random["nc"] - found["sweeps"]["nc"]),
         "distance_ratio": energy.terms(swept)[0] / energy.terms(descended)[0],
@@ -115,9 +121,9 @@ def case_quality(path: Path, sampling: str) -> dict:
     }
 
 
-def best_pca(problem: Problem) -> dict:
-    """Agreement of the plane fit whose number of neighbours, `k`, serves this case best by mean agreement."""
-    tried = [{**problem.agreement(pca_normals(problem.points, k)[0]), "k": k} for k in PCA_NEIGHBOURS]
+def best_pca(problem: Problem, neighbours=PCA_NEIGHBOURS) -> dict:
+    """Agreement of the plane fit whose number of neighbours, `k`, serves these points best by mean agreement."""
+    tried = [{**problem.agreement(pca_normals(problem.points, k)[0]), "k": k} for k in neighbours]
     return max(tried, key=lambda found: found["nc"])
 
 
@@ -141,15 +147,16 @@ def _cleaned(case):
 def ablation(case: Case) -> list[dict]:
     """NC for the paper's seven combinations of weights, at DENSITIES points of the case's true surface.
 
-    Each is tried twice: as multiples of the printed weights and as the same multiples of the defaults.
+    Each is tried twice: as multiples of the printed weights and as the same multiples of the defaults, with
+    ABLATION_STEPS steps of Adam each.
     """
     rows = []
     for count in DENSITIES:
         problem = surface_problem(case, count)
         row = {"points": count, "sweeps": problem.agreement(problem.sweeps())["nc"]}
         for name, base in (("printed", PRINTED), ("default", EnergyWeights())):
-            weights = combinations(base)
-            row[name] = [problem.agreement(problem.adam(problem.energy(w)))["nc"] for w in weights]
+            found = [problem.adam(problem.energy(w), max_steps=ABLATION_STEPS) for w in combinations(base)]
+            row[name] = [problem.agreement(axes)["nc"] for axes in found]
         rows.append(row)
     return rows
 
@@ -159,19 +166,22 @@ def combinations(base: EnergyWeights) -> list[EnergyWeights]:
     return [EnergyWeights(d * base.distance, g * base.gradient, a * base.alignment) for a, d, g in _FACTORS]
 
 
-def surface_problem(case: Case, count: int, seed: int = 0) -> Problem:
+def surface_problem(case: Case, count: int) -> Problem:
     """`count` points of the true surface, uniform by area."""
-    return _on_surface(case, surface_points(case.truth, count, np.random.default_rng(seed)))
+    return _on_surface(case, surface_points(case.truth, count, np.random.default_rng(0)))
 
 
 def convergence(case: Case) -> dict:
-    """For each kind of input: its number of points, the energy before each step of Adam relative to the first, and the
-    mean turn of an axis in each of the first sweeps, degrees. Both start from random axes, as in the paper."""
+    """For each kind of input: its number of points, the energy before each of the first steps of Adam relative to the
+    first, the mean turn of an axis in each of the first sweeps, degrees, and the number of sweeps until they end. Both
+    start from random axes, as the paper does."""
     curves = {}
     for name, problem in _inputs(case).items():
-        _, history = minimise(problem.energy().value_and_gradient, problem.random_start())
+        _, history = minimise(problem.energy().value_and_gradient, problem.random_start(), max_steps=CURVE_STEPS)
         turns = mean_turns(problem.mirrors, problem.random_start(), CURVE_SWEEPS)
-        curves[name] = {"points": len(problem.points), "energy": np.divide(history, history[0]), "turns": turns}
+        _, _, sweeps = reflection_sweeps(problem.points, problem.samples.facets, start=problem.random_start())
+        energy = np.divide(history, history[0])
+        curves[name] = {"points": len(problem.points), "energy": energy, "turns": turns, "sweeps": sweeps}
     return curves
 
 

@@ -7,11 +7,12 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
+from matplotlib.ticker import MaxNLocator
 
 from core.io.atomic import atomic_path
 
 INK, QUIET, ACCENT = "#1b2430", "#66707c", "#e4572e"
-_COLOURS = "#17344f", "#3f7fa3", "#e4572e", "#c9a227", "#6a8d55"
+_COLOURS = ["#17344f", "#3f7fa3", ACCENT, "#c9a227", "#6a8d55"]
 _STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
@@ -21,6 +22,7 @@ _STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.prop_cycle": plt.cycler(color=_COLOURS),
     "grid.color": "#e6e9ec",
     "legend.frameon": False,
 }
@@ -33,13 +35,15 @@ def plot_convergence(path: Path, curves: dict[str, dict], tolerance: float) -> N
     """
     with plt.rc_context(_STYLE):
         figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
-        for colour, (name, curve) in zip(_COLOURS, curves.items(), strict=True):
-            left.plot(curve["energy"], color=colour, label=f"{name}, {curve['points']:,} points")
-            right.plot(range(1, len(curve["turns"]) + 1), curve["turns"], color=colour, marker=".")
+        for name, curve in curves.items():
+            left.plot(curve["energy"])
+            turns = curve["turns"]
+            right.plot(range(1, len(turns) + 1), turns, marker=".", label=f"{name}, {curve['points']:,} points")
         left.set(yscale="log", xlabel="step of Adam", ylabel="energy / energy of the random start")
-        left.legend()
         right.axhline(tolerance, color=QUIET, linestyle="--", linewidth=1)
         right.annotate("the sweeps end here", (1, tolerance), (0, 4), textcoords="offset points", color=QUIET)
+        right.xaxis.set_major_locator(MaxNLocator(integer=True))
+        right.legend(loc="lower left")
         right.set(yscale="log", xlabel="sweep", ylabel="mean turn of an axis, degrees")
         _save(figure, path)
 

@@ -122,15 +122,16 @@ def measured(nc: float, stage_cpu: float) -> dict:
         "versions": {"Python": "3"},
         "quality": {"uniform": [case]},
         "ablation": [{"points": 3000, "sweeps": 0.99, "printed": [0.9] * 7, "default": [0.95] * 7}],
-        "convergence": {"dense": {"points": 100, "energy": [1.0, 0.5], "turns": [10.0, 1.0]}},
+        "convergence": {"dense": {"points": 100, "energy": [1.0, 0.5], "turns": [10.0, 1.0], "sweeps": 31}},
         "cost": runs,
     }
 
 
 def test_verdicts_follow_the_numbers():
     good, bad = (list(verdicts(measured(nc, cpu))) for nc, cpu in ((0.995, 2.0), (0.97, 4.0)))
-    assert [line.startswith("**Met**") for line in good] == [True, True, True, False, True, True, True]
-    assert [line.startswith("**Met**") for line in bad] == [False, False, True, False, False, False, True]
+    assert [line.startswith("**Met**") for line in good] == [True, True, True, False, False, True, True, True]
+    assert [line.startswith("**Met**") for line in bad] == [False, False, True, False, False, False, False, True]
+    assert good[4].endswith("than the sweeps on no case.")
     assert "a (0.9700, 0.9800 at k = 7)" in bad[1]
 
 
