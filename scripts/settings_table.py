@@ -22,7 +22,7 @@ def _allowed(option):
         return ", ".join(f"`{choice}`" for choice in choices)
     if limits is None:
         return "`True`, `False`"
-    return f"{limits[0]:g} to {limits[1]:g} {unit}".strip() + (f", or `{word}`" if word else "")
+    return f"{limits[0]:.10g} to {limits[1]:.10g} {unit}".strip() + (f", or `{word}`" if word else "")
 
 
 def main() -> None:
