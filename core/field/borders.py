@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-NEIGHBOURS = 16
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
@@ -50,14 +49,14 @@ class Rims:
     limit: np.ndarray
 
 
-def find_rims(points, normals, frames, spacing, tree: KDTree, bridge: float) -> Rims:
+def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float) -> Rims:
     """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.
 
     points, normals : (n,3) float64     frames : (n,2,3) tangents     spacing : (n,) local spacing
+    neighbours      : (n,k) int, nearest first       tree : of the points
     bridge          : gaps up to this many local spacings are crossed
     """
-    n, k = len(points), min(NEIGHBOURS, len(points) - 1)
-    neighbours = tree.query(points, k=k + 1, workers=-1)[1][:, 1:]
+    n, k = neighbours.shape
     step = points[neighbours] - points[:, None]
     flat = _level(step, normals[:, None], normals[neighbours]) & _aligned(normals[:, None], normals[neighbours], _FLAT)
     folded, lateral, toward, line = _unfolded(step, normals, normals[neighbours], spacing, ~flat)

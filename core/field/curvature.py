@@ -1,9 +1,7 @@
 """Bending of the surface at each sample, from its neighbours' positions and normals."""
 
 import numpy as np
-from scipy.spatial import KDTree
 
-NEIGHBOURS = 16
 _WIDTH = 1.5  # of the Gaussian weight, local spacings
 _ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting
 _ALIGNED = 0.5  # least |n_i . n_j| of neighbours that count
@@ -18,15 +16,14 @@ def tangent_frames(normals: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def bending(points, normals, frames, spacing, tree: KDTree) -> np.ndarray:
+def bending(points, normals, frames, spacing, neighbours) -> np.ndarray:
     """Second fundamental forms as tensors B, (n,3,3) float64: the surface near a sample has height l.B.l / 2 above the
     tangent plane at tangential offset l.
 
-    Weighted least squares over the 16 nearest samples, each giving its height and, through its normal turned to agree
-    with the sample's, the slope there (three equations each). Curvatures are limited to one per local spacing.
+    Weighted least squares over the `neighbours` (n,k) of each sample, each giving its height and, through its normal
+    turned to agree with the sample's, the slope there (three equations each). Curvatures are limited to one per local
+    spacing.
     """
-    k = min(NEIGHBOURS, len(points) - 1)
-    neighbours = tree.query(points, k=k + 1, workers=-1)[1][:, 1:]
     step = points[neighbours] - points[:, None]
     z = np.einsum("nki,ni->nk", step, normals)
     x, y = np.moveaxis(np.einsum("nki,nai->nka", step, frames), 2, 0)

@@ -10,7 +10,8 @@ from .borders import Rims, excess, find_rims
 from .curvature import bending, tangent_frames
 from .diffusion import fused_axes, kernel_weights
 
-NEAREST = 12
+NEIGHBOURS = 16  # of a sample, that its patch is fitted to
+NEAREST = 12  # of a query, that it is projected with
 CHUNK = 32768
 UNCOVERED = 1.5  # the surface is never further from its nearest sample than this, local spacings (or the bridged reach)
 
@@ -137,11 +138,18 @@ class LocalSurface:
         return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(squared, np.finfo(float).tiny))
 
 
+def patch_neighbours(tree: KDTree) -> np.ndarray:
+    """The samples that each one's patch is fitted to, (n,k) int, nearest first: 16, or all others where there are
+    fewer."""
+    return tree.query(tree.data, k=min(NEIGHBOURS, tree.n - 1) + 1, workers=-1)[1][:, 1:]
+
+
 def fit_local_surface(points, normals, confidence, spacing, bridge: float) -> LocalSurface:
     """Patches and rims of samples (n,3) with axes (n,3), their confidence (n,) and local spacing (n,); gaps up to
     `bridge` spacings are closed."""
     tree = KDTree(points)
     frames = tangent_frames(normals)
-    bend = bending(points, normals, frames, spacing, tree)
-    rims = find_rims(points, normals, frames, spacing, tree, bridge)
+    neighbours = patch_neighbours(tree)
+    bend = bending(points, normals, frames, spacing, neighbours)
+    rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge)
     return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)

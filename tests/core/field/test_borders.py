@@ -4,6 +4,7 @@ from scipy.spatial import KDTree
 
 from core.field.borders import DISC, excess, find_rims
 from core.field.curvature import tangent_frames
+from core.field.local_surface import patch_neighbours
 from core.points import local_spacing
 from tests import shapes
 
@@ -13,7 +14,8 @@ UP = np.array([0.0, 0.0, 1.0])
 def rims_of(points, normals, bridge=3.0):
     normals = np.broadcast_to(normals, points.shape)
     spacing = local_spacing(points)
-    return find_rims(points, normals, tangent_frames(normals), spacing, KDTree(points), bridge), spacing
+    tree = KDTree(points)
+    return find_rims(points, normals, tangent_frames(normals), spacing, patch_neighbours(tree), tree, bridge), spacing
 
 
 def open_rim(rims):

@@ -3,13 +3,14 @@ import pytest
 from scipy.spatial import KDTree
 
 from core.field.curvature import bending, tangent_frames
+from core.field.local_surface import patch_neighbours
 from core.points import local_spacing
 from tests import shapes
 
 
 def forms(points, normals):
     spacing = local_spacing(points)
-    return bending(points, normals, tangent_frames(normals), spacing, KDTree(points)), spacing
+    return bending(points, normals, tangent_frames(normals), spacing, patch_neighbours(KDTree(points))), spacing
 
 
 def tangential(normals):
