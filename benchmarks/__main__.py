@@ -8,7 +8,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
-from core import InputError, Settings, SettingsError, VADError
+from core import InputError, Settings, SettingsError
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 from core.settings import options
@@ -18,8 +18,8 @@ from .peers import check_open3d
 from .report import comparison, markdown_tables, read_run, terminal_header, terminal_row
 from .results import write_results
 from .run import run_cases
+from .status import CASE_FAILED, DONE, exit_status
 
-DONE, CASE_FAILED, BAD_INPUT, CANCELLED = 0, 1, 2, 130
 _LIBRARIES = ("numpy", "scipy", "libigl")
 
 
@@ -30,14 +30,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: list[str] | None = None) -> int:
     """Run on `arguments` (default: those of the process) and return the exit status."""
-    try:
-        return _benchmark(_parser().parse_args(arguments))
-    except VADError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("error: cancelled", file=sys.stderr)
-        return CANCELLED
+    return exit_status(lambda: _benchmark(_parser().parse_args(arguments)))
 
 
 def _parser():

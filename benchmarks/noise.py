@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from core import Settings, VADError, reconstruct
+from core import Settings, reconstruct
 from core.normals.pca import pca_normals
 
 from .cases import Case, find_cases, load_case
 from .geometry import closest_points
 from .metrics import surface_errors
 from .peers import Clock
+from .status import DONE, exit_status
 
 NOISE = (0.0, 0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 STRAYS = (0.05, 0.2)  # per sample
@@ -30,16 +31,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--cases", type=lambda text: text.split(","), help="only these (default: all)")
     given = parser.parse_args(arguments)
-    print(f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}")
-    try:
+
+    def command():
+        print(f"| {' | '.join(_COLUMNS)} |\n|{'---|' * len(_COLUMNS)}")
         for path in find_cases(given.folder, given.cases):
             case = load_case(path)
             for dirt, points in dirty(case):
                 print(_row(case, dirt, points), flush=True)
-    except VADError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+        return DONE
+
+    return exit_status(command)
 
 
 def dirty(case: Case, seed: int = 0):

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from core import VADError
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 from core.normals.energy import EnergyWeights
@@ -31,11 +30,11 @@ from .normal_quality import (
 from .peers import check_open3d
 from .plots import plot_convergence, plot_growth
 from .report import Column, markdown_table
+from .status import DONE, exit_status
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
 _LIBRARIES = "numpy", "scipy", "open3d"
-DONE, BAD_INPUT, CANCELLED = 0, 2, 130
 
 TIMED = 10_000, 100_000
 TARGET_RATIO, TARGET_GAP, TARGET_TIME, TARGET_MEMORY = 0.5, 1e-3, 3.0, 12.0
@@ -126,15 +125,13 @@ def main(arguments: list[str] | None = None) -> int:
         epilog="exit status: 0 done, 2 bad input (one line says what), 130 cancelled",
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path, help=f"holds the cases, .npz files, {SHAPE} among them")
-    try:
-        print(f"wrote {write_page(measure(parser.parse_args(arguments).folder), DOCS)}")
-    except VADError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("error: cancelled", file=sys.stderr)
-        return CANCELLED
-    return DONE
+    given = parser.parse_args(arguments)
+
+    def command():
+        print(f"wrote {write_page(measure(given.folder), DOCS)}")
+        return DONE
+
+    return exit_status(command)
 
 
 def measure(folder: Path) -> dict:
