@@ -7,7 +7,8 @@ import numpy as np
 
 _DISTINCT = 1e-5  # below this the two largest eigenvalues are too close for the closed form
 
-_ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
+COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_ROWS, _COLUMNS = np.array(COMPONENTS).T
 
 
 def outer(vectors: np.ndarray) -> np.ndarray:

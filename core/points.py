@@ -6,11 +6,13 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .errors import InputError
+from .progress import Progress
 
 MINIMUM_SAMPLES = 4
 SPACING_NEIGHBOURS = 6
 _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
+_CHUNK = 65536  # samples
 _FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
 
@@ -114,11 +116,13 @@ def _framed(given, source_index, warnings):
     return Samples(points, given, source_index, centre, scale, warnings)
 
 
-def local_spacing(points: np.ndarray) -> np.ndarray:
+def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
     """rho, (n,) float64 in the units of `points`: mean distance of each sample to its 6 nearest (fewer if n < 7)."""
     k = min(SPACING_NEIGHBOURS, len(points) - 1)
-    distances, _ = KDTree(points).query(points, k=k + 1, workers=-1)
-    return distances[:, 1:].mean(axis=1)
+    tree, spacing = KDTree(points), np.empty(len(points))
+    for part in Progress.of(progress).chunks(len(points), _CHUNK):
+        spacing[part] = tree.query(points[part], k=k + 1, workers=-1)[0][:, 1:].mean(axis=1)
+    return spacing
 
 
 def _first_of_each(points, rows):

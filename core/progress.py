@@ -1,6 +1,6 @@
 """Progress reports that double as the place where a run can be cancelled."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 from .errors import Cancelled
 
@@ -39,6 +39,19 @@ class Progress:
             self._start + stop * width,
             self._text if text is None else text,
         )
+
+    def chunks(self, count: int, size: int) -> Iterator[slice]:
+        """Slices of `size` that cover `count` rows in order; reports before each, so that no more than `size` rows are
+        ever worked through without a look."""
+        for first in range(0, count, size):
+            self(first / count)
+            yield slice(first, min(first + size, count))
+
+    def each(self, items: Sequence) -> Iterator:
+        """The items in order; reports before each."""
+        for number, item in enumerate(items):
+            self(number / len(items))
+            yield item
 
     def __call__(self, fraction: float) -> None:
         """Report; raises :class:`Cancelled` where the callback says so."""

@@ -8,10 +8,12 @@ Neighbours beyond a crease are unfolded about the line where the two tangent pla
 other, and that line is where the patch ends, unless the sheet goes on straight (two sheets that cross).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.spatial import KDTree
+
+from ..progress import Progress
 
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
@@ -22,6 +24,8 @@ _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
 _STEP = 0.35  # they may be off each other's plane by this share of their distance
 _FOLD = 0.87  # largest |n_i . n_j| of neighbours with a fold between them
 _FOLD_REACH = 1.5  # both are this close to the crease, local spacings
+_CHUNK = 8192  # samples
+_PAIRS = 500_000
 _STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
 
 
@@ -49,17 +53,30 @@ class Rims:
     limit: np.ndarray
 
 
-def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float) -> Rims:
+def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:
     """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.
 
     points, normals : (n,3) float64     frames : (n,2,3) tangents     spacing : (n,) local spacing
     neighbours      : (n,k) int, nearest first       tree : of the points
     bridge          : gaps up to this many local spacings are crossed
     """
+    progress, n = Progress.of(progress), len(points)
+    found = []
+    for part in progress.chunks(n, _CHUNK):
+        look = progress.part(part.start / n, part.stop / n)
+        rows = np.arange(n)[part]
+        found.append(
+            _find_rims(rows, points, normals, frames[part], spacing[part], neighbours[part], tree, bridge, look)
+        )
+    return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
+
+
+def _find_rims(samples, points, normals, frames, spacing, neighbours, tree, bridge, progress):
     n, k = neighbours.shape
-    step = points[neighbours] - points[:, None]
-    flat = _level(step, normals[:, None], normals[neighbours]) & _aligned(normals[:, None], normals[neighbours], _FLAT)
-    folded, lateral, toward, line = _unfolded(step, normals, normals[neighbours], spacing, ~flat)
+    own, theirs = normals[samples], normals[neighbours]
+    step = points[neighbours] - points[samples, None]
+    flat = _level(step, own[:, None], theirs) & _aligned(own[:, None], theirs, _FLAT)
+    folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
     crease, limit = _creases(step, flat, folded, toward, line, spacing)
     x, y = np.moveaxis(np.einsum("nki,nai->nka", np.where(folded[..., None], lateral, step), frames), 2, 0)
     same = flat | folded
@@ -85,7 +102,9 @@ def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge
     gap = (width > GAP) & (count > 0)
     distance = np.full(n, np.inf)
     rows = np.flatnonzero(gap)
-    distance[rows] = _distance_across(rows, points, normals, outward, spacing, tree, bridge)
+    distance[rows] = _distance_across(
+        samples[rows], points, normals, outward[rows], spacing[rows], tree, bridge, progress
+    )
     bridged = np.isfinite(distance)
     reach = np.where(bridged, np.maximum(DISC * spacing, BRIDGED * np.where(bridged, distance, 0.0)), 0.0)
     ends = np.einsum("nea,nai->nei", ends, frames)
@@ -95,35 +114,38 @@ def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge
 def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray]:
     """How far foot points lie outside the patches of given samples, along the tangent plane.
 
-    sample : (m,k) int     lateral : (m,k,3) tangential offset from the sample     spacing : (m,k) of the sample
-    Returns the distance (m,k) to the patch and the step (m,k,3) that leads out of it (its length is the distance).
+    sample : (m,k) int     lateral : (3,m,k) tangential offset from the sample     spacing : (m,k) of the sample
+    Returns the distance (m,k) to the patch and the step (3,m,k) that leads out of it (its length is the distance).
     """
-    length = np.linalg.norm(lateral, axis=2)
-    open_side = rims.gap[sample] & (
-        np.einsum("mki,mki->mk", lateral, rims.outward[sample]) > length * rims.opening[sample]
-    )
-    radius = np.where(open_side & rims.bridged[sample], rims.reach[sample], DISC * spacing)
-    beyond = np.maximum(length - radius, 0.0)
-    step = lateral * (beyond / np.maximum(length, np.finfo(float).tiny))[..., None]
+    length = np.sqrt(np.einsum("imk,imk->mk", lateral, lateral))
+    radius = DISC * spacing
+    gap = np.nonzero(rims.gap[sample])
+    owner = sample[gap]
+    along = np.einsum("ig,gi->g", lateral[:, *gap], rims.outward[owner])
+    open_side = along > length[gap] * rims.opening[owner]
+    radius[gap] = np.where(open_side & rims.bridged[owner], rims.reach[owner], radius[gap])
+    beyond = np.maximum(length - radius, 0)
+    step = lateral * (beyond / np.maximum(length, np.finfo(length.dtype).tiny))
 
-    at_rim = np.nonzero(open_side & ~rims.bridged[sample])
-    to_edge = _to_edges(lateral[at_rim], rims.ends[sample[at_rim]])
+    at_rim = tuple(index[open_side & ~rims.bridged[owner]] for index in gap)
+    to_edge = _to_edges(lateral[:, *at_rim].T, rims.ends[sample[at_rim]])
     edge_distance = np.linalg.norm(to_edge, axis=1)
-    past = np.maximum(edge_distance - RIM * spacing[at_rim], 0.0)
-    worse = past > beyond[at_rim]
-    rows = tuple(axis[worse] for axis in at_rim)
-    beyond[rows] = past[worse]
-    step[rows] = to_edge[worse] * (past[worse] / edge_distance[worse])[:, None]
+    past = np.maximum(edge_distance - RIM * spacing[at_rim], 0)
+    _replace_where_worse(beyond, step, at_rim, past, to_edge * (past / np.where(past > 0, edge_distance, 1))[:, None])
 
-    at_crease = np.nonzero(np.isfinite(rims.limit[sample, 0]))
+    at_crease = np.nonzero(np.isfinite(rims.limit[:, 0])[sample])
     creased = sample[at_crease]
-    across = np.einsum("mi,mci->mc", lateral[at_crease], rims.crease[creased])
-    over = np.einsum("mc,mci->mi", np.maximum(across - rims.limit[creased], 0.0), rims.crease[creased])
-    past = np.linalg.norm(over, axis=1)
-    worse = past > beyond[at_crease]
-    rows = tuple(axis[worse] for axis in at_crease)
-    beyond[rows], step[rows] = past[worse], over[worse]
+    across = np.einsum("im,mci->mc", lateral[:, *at_crease], rims.crease[creased])
+    over = np.einsum("mc,mci->mi", np.maximum(across - rims.limit[creased], 0), rims.crease[creased])
+    _replace_where_worse(beyond, step, at_crease, np.linalg.norm(over, axis=1), over)
     return beyond, step
+
+
+def _replace_where_worse(beyond, step, place, distance, way):
+    """Put larger distances (p,) and their steps (p,3) at the indices `place`."""
+    worse = distance > beyond[place]
+    place = tuple(index[worse] for index in place)
+    beyond[place], step[:, *place] = distance[worse], way[worse].T
 
 
 def _level(step, normals, other_normals):
@@ -176,19 +198,18 @@ def _creases(step, flat, folded, toward, line, spacing):
     return np.take_along_axis(toward, chosen[..., None], axis=1), limit
 
 
-def _distance_across(rows, points, normals, outward, spacing, tree, bridge):
+def _distance_across(rows, points, normals, outward, spacing, tree, bridge, progress):
     """(m,) distance to the nearest sample of the sheet across the gap, inf where it is beyond the bridging length."""
     within = min(len(points), int(4 * bridge**2) + 8)  # samples in a disc of that radius, with a margin
     across = np.full(len(rows), np.inf)
-    chunk = max(1, 2_000_000 // within)
-    for first in range(0, len(rows), chunk):
-        part = rows[first : first + chunk]
-        distance, other = tree.query(points[part], k=within, workers=-1)
-        step = points[other] - points[part, None]
+    for part in progress.chunks(len(rows), max(1, _PAIRS // within)):
+        own = rows[part]
+        distance, other = tree.query(points[own], k=within, workers=-1)
+        step = points[other] - points[own, None]
         ahead = np.einsum("nki,ni->nk", step, outward[part]) > 0.8 * distance
         near = (distance > 0) & (distance < bridge * spacing[part, None])
-        sheet = _aligned(normals[part, None], normals[other], 0.5) & _level(step, normals[part, None], normals[other])
-        across[first : first + chunk] = np.where(ahead & near & sheet, distance, np.inf).min(axis=1)
+        sheet = _aligned(normals[own, None], normals[other], 0.5) & _level(step, normals[own, None], normals[other])
+        across[part] = np.where(ahead & near & sheet, distance, np.inf).min(axis=1)
     return across
 
 

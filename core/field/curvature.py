@@ -2,10 +2,13 @@
 
 import numpy as np
 
+from ..progress import Progress
+
 _WIDTH = 1.5  # of the Gaussian weight, local spacings
 _ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting
 _ALIGNED = 0.5  # least |n_i . n_j| of neighbours that count
 _STIFFNESS = 1e-3
+_CHUNK = 16384  # samples
 
 
 def tangent_frames(normals: np.ndarray) -> np.ndarray:
@@ -16,7 +19,7 @@ def tangent_frames(normals: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def bending(points, normals, frames, spacing, neighbours) -> np.ndarray:
+def bending(points, normals, frames, spacing, neighbours, progress=None) -> np.ndarray:
     """Second fundamental forms as tensors B, (n,3,3) float64: the surface near a sample has height l.B.l / 2 above the
     tangent plane at tangential offset l.
 
@@ -24,10 +27,18 @@ def bending(points, normals, frames, spacing, neighbours) -> np.ndarray:
     turned to agree with the sample's, the slope there (three equations each). Curvatures are limited to one per local
     spacing.
     """
-    step = points[neighbours] - points[:, None]
-    z = np.einsum("nki,ni->nk", step, normals)
+    bend = np.empty((len(points), 3, 3))
+    for part in Progress.of(progress).chunks(len(points), _CHUNK):
+        bend[part] = _bending(points, normals, part, frames[part], spacing[part], neighbours[part])
+    return bend
+
+
+def _bending(points, normals, rows, frames, spacing, neighbours):
+    own = normals[rows]
+    step = points[neighbours] - points[rows, None]
+    z = np.einsum("nki,ni->nk", step, own)
     x, y = np.moveaxis(np.einsum("nki,nai->nka", step, frames), 2, 0)
-    agreement = np.einsum("nki,ni->nk", normals[neighbours], normals)
+    agreement = np.einsum("nki,ni->nk", normals[neighbours], own)
     tilt = np.einsum("nki,nai->nka", normals[neighbours], frames)
     counted = np.abs(agreement) > _ALIGNED
     slope = -tilt / np.where(counted, agreement, 1.0)[..., None]
@@ -45,7 +56,7 @@ def bending(points, normals, frames, spacing, neighbours) -> np.ndarray:
         (np.stack([zero, x, y], axis=2), slope[..., 1]),
     )
     matrix = _STIFFNESS * (spacing**2)[:, None, None] * np.eye(3)
-    right = np.zeros((len(points), 3))
+    right = np.zeros((len(own), 3))
     for row, value in equations:
         weighted = row * weight[..., None]
         matrix = matrix + weighted.transpose(0, 2, 1) @ row

@@ -8,32 +8,36 @@ underflows far from the surface.
 
 import numpy as np
 
-from ..linalg import outer, principal_axes
+from ..linalg import COMPONENTS, principal_axes
 
 DIFFUSION_LENGTH = 0.5  # sqrt(t) in local spacings, about the paper's t = h^2
 
 
-def kernel_weights(distance, spacing) -> tuple[np.ndarray, np.ndarray]:
-    """Area-weighted Yukawa kernels of each query's samples, up to a factor per query.
+def kernel_weights(distance, spacing, height) -> tuple[np.ndarray, np.ndarray]:
+    """Area-weighted Yukawa kernels of each query's samples, up to a factor per query, and their slopes.
 
-    distance, spacing : (m,k) float64, to the samples (nearest first) and local spacing there
-    Returns the weights (m,k) and sqrt(t) of each query, (m,1). The area weight spacing^2 is ours: without it a dense
-    region outvotes a sparse one.
+    distance : (m,k) float64, to the samples, nearest first     spacing : (m,k) local spacing there
+    height   : (m,k) signed offset of the query from each sample along its normal
+    Returns the kernel (m,k) and, relative to it, its derivative along the normal (m,k), both float32. The area weight
+    spacing^2 is ours: without it a dense region outvotes a sparse one.
     """
     length = DIFFUSION_LENGTH * spacing[:, :1]
-    return spacing**2 * np.exp((distance[:, :1] - distance) / length) / distance, length
+    decay = ((distance[:, :1] - distance) / length).astype(np.float32)
+    inverse = (1 / distance).astype(np.float32)
+    kernel = spacing.astype(np.float32) ** 2 * np.exp(decay) * inverse
+    return kernel, (inverse + (1 / length).astype(np.float32)) * height * inverse
 
 
-def fused_axes(weight, length, distance, height, normals) -> np.ndarray:
+def fused_axes(weight, pull, normals) -> np.ndarray:
     """Y_f: the principal axis of the diffused tensor field Y_t, signed by the diffused vector field Y_v, (m,3) float64.
 
-    weight, distance : (m,k)     length : (m,1) sqrt(t)     height : (m,k) signed offset of the query from each sample
-    along its normal             normals : (m,k,3)
+    weight, pull : (m,k) kernels and their slopes along the normals, relative to them     normals : (3,m,k)
 
     The pair of opposite sources at +-eps along a normal is taken to its limit, the kernel's derivative along the
     normal. Neither field depends on the sign of a normal.
     """
-    axes, _ = principal_axes(np.einsum("mk,mka->ma", weight, outer(normals)))
-    slope = weight * (1 / distance + 1 / length) * height / distance
-    direction = np.einsum("mk,mki->mi", slope, normals)
+    weighted = weight * normals
+    tensor = [np.einsum("mk,mk->m", weighted[a], normals[b]) for a, b in COMPONENTS]
+    axes, _ = principal_axes(np.stack(tensor, axis=1).astype(np.float64))
+    direction = np.einsum("imk,mk->mi", weighted, pull)
     return axes * np.where(np.einsum("mi,mi->m", axes, direction) < 0, -1.0, 1.0)[:, None]

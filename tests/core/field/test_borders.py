@@ -72,8 +72,8 @@ class TestExcess:
     def at(self, points, sample, lateral, bridge=3.0):
         rims, spacing = rims_of(points, UP, bridge)
         sample = np.full((len(lateral), 1), sample)
-        beyond, step = excess(rims, sample, np.asarray(lateral)[:, None], spacing[sample])
-        return beyond[:, 0], step[:, 0], spacing[sample[0, 0]]
+        beyond, step = excess(rims, sample, np.asarray(lateral).T[:, :, None], spacing[sample])
+        return beyond[:, 0], step[:, :, 0].T, spacing[sample[0, 0]]
 
     def test_inside_its_disc_a_sample_covers_and_beyond_it_the_distance_to_the_disc_counts(self):
         points = shapes.disc(500)

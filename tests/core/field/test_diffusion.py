@@ -14,8 +14,8 @@ SPACING = 0.1
 def fused(points, normals, x, k, spacing=SPACING):
     distance, sample = KDTree(points).query(x, k=k)
     height = np.einsum("mki,mki->mk", x[:, None] - points[sample], normals[sample])
-    weight, length = kernel_weights(distance, np.broadcast_to(spacing, len(points))[sample])
-    return fused_axes(weight, length, distance, height, normals[sample])
+    weight, pull = kernel_weights(distance, np.broadcast_to(spacing, len(points))[sample], height)
+    return fused_axes(weight, pull, np.moveaxis(normals[sample], 2, 0))
 
 
 def dense(points, normals, x, spacing=SPACING, apart=1e-4):
@@ -86,13 +86,16 @@ def test_far_away_it_neither_underflows_nor_loses_the_direction():
 
 def test_density_does_not_vote():
     """Halfway between a dense floor and a sparse wall, each sample counts for the area it stands for."""
-    weight, length = kernel_weights(np.array([[1.0, 1.0]]), np.array([[0.1, 0.2]]))
+    weight, _ = kernel_weights(np.array([[1.0, 1.0]]), np.array([[0.1, 0.2]]), np.zeros((1, 2)))
     assert weight[0, 1] / weight[0, 0] == pytest.approx(4)
-    assert length.tolist() == [[pytest.approx(0.1 * DIFFUSION_LENGTH)]]
 
 
 def test_weights_fall_with_distance():
     distance = np.array([[0.1, 0.2, 0.3]])
-    weight, length = kernel_weights(distance, np.full((1, 3), 0.1))
+    height = np.array([[0.1, -0.1, 0.05]])
+    weight, pull = kernel_weights(distance, np.full((1, 3), 0.1), height)
+    length = 0.1 * DIFFUSION_LENGTH
     expected = np.exp(-distance / length) / distance
-    np.testing.assert_allclose(weight / weight[:, :1], expected / expected[:, :1])
+    np.testing.assert_allclose(weight / weight[:, :1], expected / expected[:, :1], rtol=1e-5)
+    slope = (1 / distance + 1 / length) * height / distance
+    np.testing.assert_allclose(pull, slope, rtol=1e-5)

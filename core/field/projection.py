@@ -1,0 +1,162 @@
+"""The projection distance of queries close to the surface (section 3.1 of the paper), blended over the nearest samples.
+
+This is where a run spends most of its time. Offsets are taken in double precision and worked on in single precision,
+whose error is then relative to their length; vectors are stored component by component, (3,m,k).
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..parallel import in_order
+from ..progress import Progress
+from .borders import excess
+from .diffusion import fused_axes, kernel_weights
+
+NEAREST = 12  # of a query, that it is projected with
+CHUNK = 8192  # queries at a time
+UNCOVERED = 1.5  # the surface is never further from its nearest sample than this, local spacings (or the bridged reach)
+
+_PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
+_MEMBERSHIP = 8.0  # how fast samples off each other's plane stop counting as one sheet
+_OTHER_SHEETS = 2  # at most, beside that of the nearest sample
+_TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
+_MEMBER = 0.3  # least membership of samples whose patch may cover a query
+_SAG = 0.25  # local spacings, by which a sheet may lie closer than its tangent plane
+
+_TINY = np.finfo(np.float32).tiny
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Where queries fall on the surface.
+
+    distance : (m,) float64, to the surface
+    step     : (m,3) float64, from the foot point to the query
+    past_rim : (m,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
+    """
+
+    distance: np.ndarray
+    step: np.ndarray
+    past_rim: np.ndarray
+
+    def __getitem__(self, chosen) -> "Projection":
+        return Projection(self.distance[chosen], self.step[chosen], self.past_rim[chosen])
+
+
+def project(surface, x: np.ndarray, progress: Progress) -> Projection:
+    """Distances and foot points of queries (m,3) on a :class:`LocalSurface`.
+
+    tau minimises, over the samples of one sheet near the query, the diffusion-weighted sum of squared offsets from
+    their patches when the query is moved by tau along the fused axis. Past a rim the lateral distance to the nearest
+    patch is added at a right angle. Of the sheets that the nearest samples belong to, the closest counts. Accurate
+    within a few local spacings of the surface; never more than the distance to the nearest sample.
+    """
+    found = Projection(np.empty(len(x)), np.empty((len(x), 3)), np.empty(len(x), bool))
+    chunks = progress.chunks(len(x), CHUNK)
+    for part, piece in in_order(lambda part: _project(surface, x[part]), chunks):
+        found.distance[part], found.step[part], found.past_rim[part] = piece
+    return found
+
+
+@dataclass(frozen=True)
+class _Nearby:
+    """The patches of each query's nearest samples, as the query sees them; float32 but for `sample` and `distance`.
+
+    sample   : (m,k)                                     distance : (m,k) float64, ascending
+    offset   : (3,m,k) from the sample to the query      normals  : (3,m,k)
+    height   : (m,k) along the normal                    above    : (m,k) over the bent patch
+    kernel   : (m,k) diffusion kernel                    pull     : (m,k) its slope along the normal
+    beyond   : (m,k) lateral distance to the patch       outward  : (3,m,k) the step out of it
+    """
+
+    sample: np.ndarray
+    distance: np.ndarray
+    offset: np.ndarray
+    normals: np.ndarray
+    height: np.ndarray
+    above: np.ndarray
+    kernel: np.ndarray
+    pull: np.ndarray
+    beyond: np.ndarray
+    outward: np.ndarray
+
+    def rows(self, chosen) -> "_Nearby":
+        return _Nearby(*(np.take(getattr(self, field.name), chosen, axis=-2) for field in fields(self)))
+
+
+def _project(surface, x):
+    near = _nearby(surface, x)
+    found, step, past_rim, member = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
+    apart = np.abs(near.height) - _SAG * surface.columns.spacing[near.sample]
+    rest = (member <= _MEMBER) & (surface.confidence[near.sample] >= _TRUSTED)
+    for _ in range(_OTHER_SHEETS):
+        rest &= apart < found[:, None]
+        row = np.flatnonzero(rest.any(axis=1))
+        anchor = rest[row].argmax(axis=1)
+        other, other_step, other_rim, member = _onto_sheet(surface, near.rows(row), anchor)
+        closer = other < found[row]
+        chosen = row[closer]
+        found[chosen], step[chosen], past_rim[chosen] = other[closer], other_step[closer], other_rim[closer]
+        rest[row] &= member <= _MEMBER
+    return found, step, past_rim
+
+
+def _nearby(surface, x):
+    k = min(NEAREST, len(surface.points))
+    distance, sample = surface.tree.query(x, k=k)
+    columns = surface.columns
+    spacing = columns.spacing[sample]
+    distance = np.maximum(distance, 1e-9 * spacing)
+    offset = np.stack([(x[:, a, None] - columns.points[a][sample]).astype(np.float32) for a in range(3)])
+    normals = np.stack([axis[sample] for axis in columns.normals])
+    height = _dot(offset, normals)
+    lateral = offset - height * normals
+    xx, yy, zz, xy, xz, yz = (bend[sample] for bend in columns.bend)
+    bent = np.stack([_dot(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
+    above = (height - 0.5 * _dot(lateral, bent)) / np.sqrt(1 + _dot(bent, bent))
+    kernel, pull = kernel_weights(distance, spacing, height)
+    return _Nearby(
+        sample, distance, offset, normals, height, above, kernel, pull, *excess(surface.rims, sample, lateral, spacing)
+    )
+
+
+def _onto_sheet(surface, near, anchor):
+    """Distance, step and whether past a rim, for the sheet of each query's sample number `anchor` (m,); and how
+    surely each sample belongs to that sheet, (m,k)."""
+    every = np.arange(len(near.sample))
+    member = _membership(near, every, anchor)
+    weight = near.kernel * member
+    weight /= weight.max(axis=1, keepdims=True)
+    axis = fused_axes(weight, near.pull, near.normals)
+    cosine = _dot(near.normals, axis.T.astype(np.float32)[:, :, None])
+    weight *= cosine
+    tau = np.einsum("mk,mk->m", weight, near.above) / np.einsum("mk,mk->m", weight, cosine)
+
+    covers = (np.abs(cosine) > _PARALLEL) & (member > _MEMBER)
+    covers[every, anchor] |= ~covers.any(axis=1)
+    best = np.where(covers, near.beyond, np.inf).argmin(axis=1)
+    step = tau[:, None] * axis + near.outward[:, every, best].T
+    found = np.linalg.norm(step, axis=1)
+
+    own, away = near.sample[every, anchor], near.distance[every, anchor]
+    slack = np.maximum(UNCOVERED * surface.spacing[own], 1.1 * surface.rims.reach[own])
+    bounded = np.clip(found, away - slack, away)
+    lifted = bounded > found
+    step[lifted] = near.offset[:, every, anchor].T[lifted]
+    found[lifted] = away[lifted]
+    step *= (bounded / np.maximum(found, _TINY))[:, None]
+    return bounded, step, near.beyond[every, best] > 0, member
+
+
+def _membership(near, every, anchor):
+    """(m,k) in [0,1]: how surely each sample lies on one sheet with the anchor, from their offsets off each other's
+    tangent plane relative to their distance; keeps close sheets apart."""
+    between = near.offset[:, every, anchor][:, :, None] - near.offset
+    height = _dot(between, near.normals[:, every, anchor][:, :, None])
+    height_back = _dot(between, near.normals)
+    return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(_dot(between, between), _TINY))
+
+
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
