@@ -39,15 +39,13 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
         return normals, confidence, {}
     if settings.solver == "energy":
         return _least_energy(points, spacing, settings, constraints, progress)
-    facets = voronoi_facets(points, spacing, settings.seed)
-    progress(0.7)
+    facets = voronoi_facets(points, spacing, settings.seed, progress.part(0.0, 0.7))
     normals, confidence, sweeps = reflection_sweeps(points, facets, constraints, progress=progress.part(0.7, 1.0))
     return normals, confidence, {"facets": len(facets.pairs), "sweeps": sweeps}
 
 
 def _least_energy(points, spacing, settings, constraints, progress):
-    polygons = facet_polygons(points, spacing, settings.seed)
-    progress(0.1)
+    polygons = facet_polygons(points, spacing, settings.seed, progress.part(0.0, 0.1))
     samples = bisector_samples(polygons, spacing, seed=settings.seed)
     progress(0.2)
     energy, mirrors = NormalEnergy(points, spacing, samples), Mirrors(points, samples.facets)
@@ -65,14 +63,15 @@ def _least_energy(points, spacing, settings, constraints, progress):
     return normals, mirrors.confidence(normals), report
 
 
-def checked_constraints(constraints, source_index: np.ndarray):
-    """Constraints given by rows of the input, as (rows of the samples used, unit axes); None stays None.
+def checked_constraints(constraints, source_index: np.ndarray, count: int):
+    """Constraints given by rows of an input of `count` rows, as (rows of the samples used, unit axes), and warnings;
+    None stays None.
 
-    Rows that were dropped (duplicates, NaN) are ignored. Raises :class:`InputError` for shapes that do not match,
-    rows outside the input, or axes without a direction.
+    Rows that were dropped (duplicates, strays, NaN) are ignored, which is what the warning says. Raises
+    :class:`InputError` for shapes that do not match, rows outside the input, or axes without a direction.
     """
     if constraints is None:
-        return None
+        return None, ()
     try:
         indices, axes = constraints
         indices, axes = np.asarray(indices), np.asarray(axes, np.float64)
@@ -82,10 +81,23 @@ def checked_constraints(constraints, source_index: np.ndarray):
         raise InputError(
             f"constraints have shapes {indices.shape} and {axes.shape}; give whole-number indices (k,) and axes (k,3)"
         )
-    length = np.linalg.norm(axes, axis=1)
-    if not (np.isfinite(length) & (length > 0)).all():
-        raise InputError(f"{int((~(length > 0)).sum())} constraint axes have no direction; give finite non-zero axes")
-    position = {row: i for i, row in enumerate(source_index.tolist())}
-    used = np.array([row in position for row in indices.tolist()], bool)
-    rows = np.array([position[row] for row in indices[used].tolist()], np.int64)
-    return rows, axes[used] / length[used, None]
+    outside = (indices < 0) | (indices >= count)
+    if outside.any():
+        raise InputError(
+            f"{outside.sum()} constraints are for rows outside the input, row {indices[outside][0]} the first; "
+            f"give rows from 0 to {count - 1}"
+        )
+    largest = np.abs(axes).max(axis=1)
+    aimless = ~(np.isfinite(largest) & (largest > 0))
+    if aimless.any():
+        raise InputError(f"{aimless.sum()} constraint axes have no direction; give finite non-zero axes")
+    axes = axes / largest[:, None]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    position = np.full(count, -1)
+    position[source_index] = np.arange(len(source_index))
+    rows = position[indices.astype(np.int64)]
+    used = rows >= 0
+    warnings = ()
+    if not used.all():
+        warnings = (f"{(~used).sum()} of {len(used)} constraints ignored: their points were dropped",)
+    return (rows[used], axes[used]), warnings

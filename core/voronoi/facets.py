@@ -2,19 +2,41 @@
 
 A facet (i,j) is dual to the Delaunay edge (i,j). Its border runs through the circumcentres of the tetrahedra around
 that edge, one side for each Delaunay face at it, so its area is a sum over the faces and needs no ordered polygon.
+
+The diagram is made block by block, which gives the facets of the whole. Say that sample i has the larger local spacing
+s of a pair (i,j) at distance L <= REACH s. What is kept of its facet lies within r <= CLIP_RADIUS s of the pair's
+midpoint, and a point x of the bisector at distance r from there is at sqrt(r^2 + L^2 / 4) from both. It belongs to the
+facet unless a third sample is closer to x, hence closer to i than twice that. So all samples within
+
+    2 s sqrt(CLIP_RADIUS^2 + REACH^2 / 4)
+
+of i tell what the clipped facet is, and a block needs, besides its own samples, those in such balls around them.
 """
 
-from collections.abc import Iterable, Iterator
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from scipy import sparse
 from scipy.spatial import Delaunay
 
+from ..progress import Progress
+from .blocks import overlapping_blocks
+
 CLIP_RADIUS = 2.5  # local spacings
+REACH = 4.0  # local spacings, the larger of a pair's
+HEEDED = 2 * math.hypot(CLIP_RADIUS, REACH / 2)  # local spacings, radius of the balls
+
 _NEGLIGIBLE = 1e-9  # squared clip radii
 _JITTER = 1e-6  # local spacings
-_CORNER_DISTANCE = 5.0  # half box sides
+_CORNER_DISTANCE = 5.0  # half boxes; from 3 on the tetrahedron holds the box
+
+_TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
+
+T = TypeVar("T")
 
 # Faces of a positively oriented tetrahedron, counter-clockwise seen from outside; face k is opposite vertex k.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -26,7 +48,7 @@ class Facets:
 
     pairs : (m,2) int64, i < j, every pair once, sorted
     area  : (m,) float64, area inside a ball of CLIP_RADIUS local spacings around the pair's midpoint, squared units of
-            the samples; pairs with nothing inside the ball are left out
+            the samples; pairs with nothing inside the ball, or farther apart than REACH, are left out
     """
 
     pairs: np.ndarray
@@ -51,56 +73,98 @@ class FacetSides:
     radius: np.ndarray
 
 
-def voronoi_facets(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> Facets:
+def voronoi_facets(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progress=None) -> Facets:
     """The facets of the samples' Voronoi diagram (section 3.2 of the paper), clipped.
 
     points  : (n,3) float64
     spacing : (n,) float64, local spacing of each sample, units of `points`
 
     Departures from the paper: sites are jittered by 1e-6 spacings, because Qhull is quadratic on cospherical and
-    coplanar input; and facets are clipped, because far from the surface they say nothing about it, and the few that
-    run out to the box would outweigh all others.
+    coplanar input; facets are clipped, because far from the surface they say nothing about it, and the few that run
+    out to the box would outweigh all others; and facets between samples far apart, on either side of a hollow, are
+    left out, which makes the diagram local and changes mean |n.n_true| by less than 1e-4 (noise: 2e-4).
     """
-    return collect_facets(facet_sides(points, spacing, seed), spacing)
+    return joined(list(by_blocks(lambda sides: facets_of(sides, spacing), points, spacing, seed, progress)))[0]
 
 
-def collect_facets(portions: Iterable[FacetSides], spacing: np.ndarray) -> Facets:
-    """The facets that have these sides."""
+def joined(blocks: list[Facets]) -> tuple[Facets, np.ndarray]:
+    """The facets of all blocks, and where each of these was among those of the blocks one after another."""
+    pairs = np.concatenate([facets.pairs for facets in blocks])
+    order = np.lexsort(pairs.T[::-1])
+    return Facets(pairs[order], np.concatenate([facets.area for facets in blocks])[order]), order
+
+
+def facets_of(sides: FacetSides, spacing: np.ndarray) -> Facets:
+    """The facets that have these sides, in the order of their pairs."""
     n = len(spacing)
-    areas = sparse.csr_matrix((n, n))
-    for sides in portions:
-        areas += sparse.csr_matrix((_swept_area(sides), (sides.i, sides.j)), shape=(n, n))
-    areas = areas.tocoo()
-    kept = areas.data > _NEGLIGIBLE * clip_radius(spacing, areas.row, areas.col) ** 2
-    return Facets(np.stack([areas.row[kept], areas.col[kept]], axis=1).astype(np.int64), areas.data[kept])
+    keys, facet = np.unique(sides.i * n + sides.j, return_inverse=True)
+    i, j = np.divmod(keys, n)
+    area = np.bincount(facet, weights=_swept_area(sides), minlength=len(keys))
+    kept = area > _NEGLIGIBLE * clip_radius(spacing, i, j) ** 2
+    return Facets(np.stack([i[kept], j[kept]], axis=1), area[kept])
 
 
-def facet_sides(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> Iterator[FacetSides]:
-    """Every side of every facet between two of the samples, in three portions; arguments as in `voronoi_facets`."""
-    sites = _sites(points, spacing, seed)
+def by_blocks(
+    make: Callable[[FacetSides], T], points: np.ndarray, spacing: np.ndarray, seed: int = 0, progress=None
+) -> Iterator[T]:
+    """What `make` makes of every side of the facets of a block, block by block; arguments as in `voronoi_facets`.
+
+    No facet is in two blocks. Qhull lets other threads run, so there are as many as there are processors; what comes
+    back does not depend on their number.
+    """
+    progress = Progress.of(progress)
+    jitter = np.random.default_rng(seed).uniform(-1, 1, points.shape) * (_JITTER * spacing)[:, None]
+    sites, radius = points + jitter, HEEDED * spacing
+    blocks, done = overlapping_blocks(sites, radius, progress.part(0.0, 0.1)), 0
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        futures = [pool.submit(lambda block: make(_sides(sites, spacing, radius, block)), block) for block in blocks]
+        try:
+            for block, future in zip(blocks, futures, strict=True):
+                yield future.result()
+                done += len(block.own)
+                progress(0.1 + 0.9 * done / len(points))
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _sides(sites, spacing, radius, block):
+    """Sides of the facets whose pair's sample with the larger spacing, or the first of equals, is the block's own."""
+    members, count = block.members, len(block.members)
+    spacing, own = spacing[members], np.isin(members, block.own, assume_unique=True)
+    beyond = radius[block.own].max() if count < len(sites) else 0.0  # the outermost of all have nothing to heed there
+    sites = np.concatenate([sites[members], _corners(sites[members], beyond)])
     delaunay = Delaunay(sites)
-    centre, positive = _circumcentres(sites, delaunay.simplices)
-    tetrahedron, opposite = np.nonzero(delaunay.neighbors > np.arange(len(delaunay.simplices))[:, None])
-    beyond = delaunay.neighbors[tetrahedron, opposite]
-    faces = np.take_along_axis(delaunay.simplices[tetrahedron], _FACES[opposite], axis=1)
-    positive = positive[tetrahedron]
 
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        a, b = faces[:, first], faces[:, second]
-        real = np.flatnonzero((a < len(points)) & (b < len(points)))
-        a, b = a[real].astype(np.int64), b[real].astype(np.int64)
-        near, far = tetrahedron[real], beyond[real]
-        outward = (a < b) == positive[real]
-        i, j = np.minimum(a, b), np.maximum(a, b)
-        step, middle = sites[j] - sites[i], 0.5 * (sites[i] + sites[j])
-        yield FacetSides(
-            i,
-            j,
-            tail=centre[np.where(outward, near, far)] - middle,
-            head=centre[np.where(outward, far, near)] - middle,
-            axis=step / np.sqrt(dot(step, step))[:, None],
-            radius=clip_radius(spacing, i, j),
-        )
+    touching = np.append(own, np.zeros(len(_TETRAHEDRON), bool))[delaunay.simplices].any(axis=1)
+    kept = np.flatnonzero(touching)
+    position = np.full(len(touching) + 1, -1)  # the last is the neighbour -1 of a face without one
+    position[kept] = np.arange(len(kept))
+    simplices, neighbors = delaunay.simplices[kept], position[delaunay.neighbors[kept]]
+    centre, positive = _circumcentres(sites, simplices)
+    tetrahedron, opposite = np.nonzero(neighbors > np.arange(len(kept))[:, None])
+    beyond = neighbors[tetrahedron, opposite]
+    faces = np.take_along_axis(simplices[tetrahedron], _FACES[opposite], axis=1).astype(np.int64)
+
+    a, b = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
+    near, far = np.tile(tetrahedron, 3), np.tile(beyond, 3)
+    real = np.flatnonzero((a < count) & (b < count))
+    a, b, near, far = a[real], b[real], near[real], far[real]
+    i, j = np.minimum(a, b), np.maximum(a, b)
+    owner = np.where(spacing[j] > spacing[i], j, i)
+    step = sites[j] - sites[i]
+    length = np.sqrt(dot(step, step))
+    kept = np.flatnonzero(own[owner] & (length <= REACH * spacing[owner]))
+    i, j, step, length, near, far = i[kept], j[kept], step[kept], length[kept], near[kept], far[kept]
+    outward = (a[kept] == i) == positive[near]
+    middle = 0.5 * (sites[i] + sites[j])
+    return FacetSides(
+        members[i],
+        members[j],
+        tail=centre[np.where(outward, near, far)] - middle,
+        head=centre[np.where(outward, far, near)] - middle,
+        axis=step / length[:, None],
+        radius=clip_radius(spacing, i, j),
+    )
 
 
 def clip_radius(spacing, i, j):
@@ -133,12 +197,13 @@ def _swept_area(sides):
     return 0.5 * (sides.radius**2 * (before + after) + (leave - enter) * turn)
 
 
-def _sites(points, spacing, seed):
-    jitter = np.random.default_rng(seed).uniform(-1, 1, points.shape) * (_JITTER * spacing)[:, None]
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    reach = _CORNER_DISTANCE * 0.5 * np.ptp(points, axis=0).max()
-    corners = middle + reach * (2 * np.indices((2, 2, 2)).reshape(3, 8).T - 1)
-    return np.concatenate([points + jitter, corners])
+def _corners(sites, beyond):
+    """(4,3) sites of a tetrahedron around all others, more than `beyond` from each. The eight corners of a box would
+    serve as well, but they lie on a sphere, which takes Qhull half as long again."""
+    low, high = sites.min(axis=0), sites.max(axis=0)
+    half = 0.5 * (high - low).max()
+    reach = max(_CORNER_DISTANCE * half, half + beyond)
+    return 0.5 * (low + high) + reach * _TETRAHEDRON
 
 
 def _circumcentres(sites, simplices):

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .facets import Facets, clip_radius, collect_facets, dot, facet_sides, inside_ball
+from .facets import Facets, by_blocks, clip_radius, dot, facets_of, inside_ball, joined
 
 _ARC_STEP = 0.25  # radians; longest chord that stands for a piece of the clip circle
 _SAME_ANGLE = 1e-9  # radians
@@ -34,16 +34,23 @@ class FacetPolygons:
         return np.stack([apex[polygon], self.corners, self.corners[following]], axis=1), polygon
 
 
-def facet_polygons(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> FacetPolygons:
-    """The polygons whose areas `voronoi_facets` returns; arguments as there.
+def facet_polygons(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progress=None) -> FacetPolygons:
+    """The polygons whose areas `voronoi_facets` returns; arguments as there."""
+    blocks = list(by_blocks(lambda sides: _polygons(sides, points, spacing), points, spacing, seed, progress))
+    facets, order = joined([polygons.facets for polygons in blocks])
+    count = np.concatenate([np.diff(polygons.first) for polygons in blocks])
+    begin, count = (np.cumsum(count) - count)[order], count[order]
+    first = np.concatenate([[0], np.cumsum(count)])
+    corner = np.repeat(begin - first[:-1], count) + np.arange(first[-1])
+    return FacetPolygons(facets, np.concatenate([polygons.corners for polygons in blocks])[corner], first)
 
-    The parts of a facet's sides that are inside the ball are sorted by angle around their mean. Where one of them
-    leaves the ball, an arc of the clip circle joins it to the next one.
-    """
-    portions = list(facet_sides(points, spacing, seed))
-    facets = collect_facets(portions, spacing)
+
+def _polygons(sides, points, spacing):
+    """The parts of a facet's sides that are inside the ball are sorted by angle around their mean. Where one of them
+    leaves the ball, an arc of the clip circle joins it to the next one."""
+    facets = facets_of(sides, spacing)
     frame = _Frame.of(points, spacing, facets)
-    facet, tail, head, leaves = _parts_inside(portions, facets, frame)
+    facet, tail, head, leaves = _parts_inside(sides, facets, frame, len(points))
 
     count = np.bincount(facet, minlength=len(facets.pairs))
     middle = 0.5 * (tail + head)
@@ -94,21 +101,16 @@ class _Frame:
         return self.radius[facet, None] * unit
 
 
-def _parts_inside(portions, facets, frame):
+def _parts_inside(sides, facets, frame, n):
     """Facet, tail, head of each part of a side that is inside the ball, and whether its side goes on beyond its head;
     for a facet that holds the whole disc, one point of its circle."""
-    n = facets.pairs.max() + 1
-    keys = facets.pairs @ [n, 1]
-    parts = []
-    for sides in portions:
-        enter, leave = inside_ball(sides)
-        key = sides.i * n + sides.j
-        facet = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-        kept = np.flatnonzero((leave > enter) & (keys[facet] == key) & (sides.j < n))
-        tail, step = sides.tail[kept], sides.head[kept] - sides.tail[kept]
-        enter, leave = enter[kept, None], leave[kept, None]
-        parts.append((facet[kept], tail + enter * step, tail + leave * step, leave[:, 0] < 1))
-    facet, tail, head, leaves = (np.concatenate(part) for part in zip(*parts, strict=True))
+    enter, leave = inside_ball(sides)
+    keys, key = facets.pairs @ [n, 1], sides.i * n + sides.j
+    facet = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+    kept = np.flatnonzero((leave > enter) & (keys[facet] == key))
+    facet, tail, step = facet[kept], sides.tail[kept], sides.head[kept] - sides.tail[kept]
+    enter, leave = enter[kept, None], leave[kept, None]
+    head, leaves, tail = tail + leave * step, leave[:, 0] < 1, tail + enter * step
     disc = np.setdiff1d(np.arange(len(keys)), facet)
     start = frame.on_circle(np.zeros(len(disc)), disc)
     return (

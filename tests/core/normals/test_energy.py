@@ -83,7 +83,7 @@ def test_signs_motion_and_scale_do_not_matter(random):
     np.testing.assert_allclose(energy.terms(signs * normals), energy.terms(normals), rtol=1e-12)
     turn = shapes.random_rotation(3)
     moved = energy_of(9 * points @ turn.T + 1)
-    np.testing.assert_allclose(moved.terms(normals @ turn.T), energy.terms(normals), rtol=0.01)
+    np.testing.assert_allclose(moved.terms(normals @ turn.T), energy.terms(normals), rtol=0.02)
 
 
 def test_printed_alignment_pulls_axes_of_a_border_into_the_surface():

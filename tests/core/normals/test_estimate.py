@@ -91,10 +91,19 @@ print("torch" in sys.modules)
 
 
 def test_constraints_are_given_by_rows_of_the_input():
-    rows, axes = checked_constraints(([5, 2, 9], [[0, 0, 2], [3, 0, 4], [1, 0, 0]]), np.array([0, 2, 5, 7]))
+    given = [5, 2, 9], [[0, 0, 2], [3e200, 0, 4e200], [1, 0, 0]]
+    (rows, axes), warnings = checked_constraints(given, np.array([0, 2, 5, 7]), 10)
     assert rows.tolist() == [2, 1]
     np.testing.assert_allclose(axes, [[0, 0, 1], [0.6, 0, 0.8]])
-    assert checked_constraints(None, np.arange(3)) is None
+    assert warnings == ("1 of 3 constraints ignored: their points were dropped",)
+    assert checked_constraints(None, np.arange(3), 3) == (None, ())
+
+
+def test_constraints_on_dropped_points_are_reported():
+    points = np.vstack([[[np.nan, 0, 0]], shapes.sphere(200)])
+    result = reconstruct(points, Settings(resolution=16, surface="none"), ([0, 1], [[0, 0, 1], [1, 0, 0]]))
+    np.testing.assert_array_equal(result.normals[0], [1, 0, 0])
+    assert "1 of 2 constraints ignored: their points were dropped" in result.report["warnings"]
 
 
 @pytest.mark.parametrize(
@@ -105,11 +114,14 @@ def test_constraints_are_given_by_rows_of_the_input():
         (([0.5], [[1, 0, 0]]), "whole-number"),
         (([0], [[0, 0, 0]]), "no direction"),
         (([0], [[np.nan, 0, 0]]), "no direction"),
+        (([0, 1], [[1, 0, 0], [0, np.inf, 0]]), "^1 constraint axes have no direction"),
+        (([0, 4], [[1, 0, 0], [0, 1, 0]]), "1 constraints are for rows outside the input, row 4 the first.* 0 to 3"),
+        (([-1], [[1, 0, 0]]), "row -1 the first"),
     ],
 )
 def test_unusable_constraints_are_refused(constraints, message):
     with pytest.raises(InputError, match=message):
-        checked_constraints(constraints, np.arange(4))
+        checked_constraints(constraints, np.arange(4), 4)
 
 
 def test_plane_fit_baseline_is_exact_on_a_plane_and_unsure_in_a_volume(random):

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Voronoi
 
+from core import Cancelled
 from core.points import local_spacing
-from core.voronoi.facets import CLIP_RADIUS, Facets, clip_radius, voronoi_facets
+from core.voronoi import blocks
+from core.voronoi.facets import CLIP_RADIUS, REACH, Facets, clip_radius, voronoi_facets
 from tests import shapes
 
 
@@ -46,10 +48,10 @@ def test_facets_of_a_plane_are_strips_cut_off_by_the_ball():
     assert areas[middle].sum() == pytest.approx(4 * strip, rel=1e-3)
 
 
-def test_facets_wider_than_the_ball_are_its_whole_disc():
-    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
-    facets = voronoi_facets(tetrahedron, np.full(4, 0.01))
-    assert len(facets.pairs) == 6
+def test_facets_wider_than_the_ball_are_its_whole_disc_and_samples_far_apart_have_none():
+    points = np.array([[0, 0, 0], [0.02, 0, 0], [0, 5, 0], [0, 0, 5.0]])
+    facets = voronoi_facets(points, np.full(4, 0.01))
+    assert facets.pairs.tolist() == [[0, 1]]
     np.testing.assert_allclose(facets.area, np.pi * (0.01 * CLIP_RADIUS) ** 2, rtol=1e-9)
 
 
@@ -60,6 +62,9 @@ def test_areas_inside_the_ball_are_those_of_scipy(random):
     voronoi, compared = Voronoi(points), 0
     for (i, j), ridge in zip(voronoi.ridge_points, voronoi.ridge_vertices, strict=True):
         corners = voronoi.vertices[ridge] - (points[i] + points[j]) / 2
+        if np.linalg.norm(points[i] - points[j]) > REACH * max(spacing[i], spacing[j]):
+            assert areas[i, j] == 0
+            continue
         if -1 in ridge or np.linalg.norm(corners, axis=1).max() > clip_radius(spacing, i, j):
             continue
         area = np.linalg.norm(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)) / 2
@@ -107,3 +112,50 @@ def test_areas_follow_scale_motion_and_order(random):
     np.testing.assert_allclose(facets_of(moved) / 49, areas, atol=tolerance)
     order = random.permutation(len(points))
     np.testing.assert_allclose(facets_of(points[order]), areas[np.ix_(order, order)], atol=tolerance)
+
+
+BLOCKWISE = {
+    "torus": shapes.torus(3000),
+    "uneven sheet": np.column_stack([np.random.default_rng(1).random((3000, 2)) ** 2, np.zeros(3000)]),
+    "volume": np.random.default_rng(2).random((1500, 3)),
+    "outliers": np.concatenate([shapes.scattered_sphere(2000), np.random.default_rng(3).normal(size=(20, 3)) * 3]),
+    "two scales": np.concatenate([shapes.torus(1500), shapes.torus(1500) * 0.02 + 2]),
+}
+
+
+@pytest.mark.parametrize("points", BLOCKWISE.values(), ids=BLOCKWISE)
+def test_blocks_give_the_facets_of_the_whole(points, monkeypatch):
+    spacing, n = local_spacing(points), len(points)
+    whole = voronoi_facets(points, spacing)
+    monkeypatch.setattr(blocks, "SIZE", 300)
+    found = voronoi_facets(points, spacing)
+    unit = clip_radius(spacing, *whole.pairs.T) ** 2, clip_radius(spacing, *found.pairs.T) ** 2
+    _, both, again = np.intersect1d(whole.pairs @ [n, 1], found.pairs @ [n, 1], return_indices=True)
+    np.testing.assert_allclose((found.area / unit[1])[again], (whole.area / unit[0])[both], rtol=1e-9, atol=1e-9)
+    for facets, size, shared in ((whole, unit[0], both), (found, unit[1], again)):
+        assert (np.delete(facets.area / size, shared) < 1e-8).all()
+
+
+def test_number_of_threads_does_not_show(monkeypatch):
+    monkeypatch.setattr(blocks, "SIZE", 100)
+    points = shapes.torus(1500)
+    several = voronoi_facets(points, local_spacing(points))
+    monkeypatch.setattr("os.cpu_count", lambda: 1)
+    one = voronoi_facets(points, local_spacing(points))
+    assert one.pairs.tobytes() == several.pairs.tobytes()
+    assert one.area.tobytes() == several.area.tobytes()
+
+
+def test_reports_progress_and_cancels_between_blocks(monkeypatch):
+    monkeypatch.setattr(blocks, "SIZE", 100)
+    points, seen = shapes.torus(1500), []
+    voronoi_facets(points, local_spacing(points), progress=lambda fraction, _: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+    assert len(seen) > 20
+    looks = []
+    with pytest.raises(Cancelled):
+        voronoi_facets(
+            points, local_spacing(points), progress=lambda fraction, _: looks.append(fraction) or fraction < 0.3
+        )
+    assert max(looks) < 0.5

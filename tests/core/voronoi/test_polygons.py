@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from core.points import local_spacing
+from core.voronoi import blocks
 from core.voronoi.facets import CLIP_RADIUS, clip_radius, voronoi_facets
 from core.voronoi.polygons import facet_polygons, triangle_areas
 from tests import shapes
@@ -63,11 +64,20 @@ def test_polygons_are_convex_counter_clockwise_and_on_the_bisector(case):
 
 
 def test_a_facet_wider_than_the_ball_becomes_a_disc():
-    tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
-    polygons = facet_polygons(tetrahedron, np.full(4, 0.01))
+    points = np.array([[0, 0, 0], [0.02, 0, 0], [0, 5, 0], [0, 0, 5.0]])
+    polygons = facet_polygons(points, np.full(4, 0.01))
+    assert polygons.facets.pairs.tolist() == [[0, 1]]
     radius = 0.01 * CLIP_RADIUS
-    around = polygons.corners - np.repeat(
-        tetrahedron[polygons.facets.pairs].mean(axis=1), np.diff(polygons.first), axis=0
-    )
+    around = polygons.corners - np.repeat(points[polygons.facets.pairs].mean(axis=1), np.diff(polygons.first), axis=0)
     np.testing.assert_allclose(np.linalg.norm(around, axis=1), radius, rtol=1e-9)
     np.testing.assert_allclose(fans(polygons), np.pi * radius**2, rtol=0.011)
+
+
+def test_blocks_give_the_polygons_of_the_whole(monkeypatch):
+    points = shapes.torus(1200)
+    spacing = local_spacing(points)
+    whole = facet_polygons(points, spacing)
+    monkeypatch.setattr(blocks, "SIZE", 100)
+    found = facet_polygons(points, spacing)
+    np.testing.assert_array_equal(found.facets.pairs, whole.facets.pairs)
+    np.testing.assert_allclose(fans(found), fans(whole), rtol=1e-6)
