@@ -17,12 +17,11 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     progress = Progress.of(progress)
     dropped = np.zeros(len(samples.points), bool)
     if settings.outliers:
-        dropped = find_outliers(samples.points, progress.part(0.0, 0.2))
+        dropped = find_outliers(samples.points, progress.part(0.0, 0.3))
     if dropped.any():
         samples = samples.without(dropped, f"{dropped.sum()} of {len(dropped)} points dropped as outliers")
-    moved, done = denoise(
-        samples.points, local_spacing(samples.points), settings.denoise, settings.seed, progress.part(0.2, 1.0)
-    )
+    spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
+    moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 1.0))
     if done:
         samples = samples.moved(moved)
         done |= {name: done[name] * samples.scale for name in ("noise", "mean_move")}

@@ -41,7 +41,7 @@ class Noise:
     neighbours: np.ndarray
 
 
-def is_noisy(points, spacing, seed: int = 0) -> bool:
+def is_noisy(points, spacing, seed: int = 0, progress=None) -> bool:
     """Whether samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
 
     Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise is everywhere
@@ -50,14 +50,18 @@ def is_noisy(points, spacing, seed: int = 0) -> bool:
     """
     if len(points) < MINIMUM_SAMPLES:
         return False
+    progress = Progress.of(progress)
     anchors, region = _anchors(points, seed)
-    fine, wide = (_GAUSS * np.median(fit_quadrics(points, anchors, k).left_out()[region], axis=1) for k in LADDER[:2])
+    fine, wide = (
+        _GAUSS * np.median(fit_quadrics(points, anchors, k, part).left_out()[region], axis=1)
+        for k, part in zip(LADDER, (progress.part(0.0, 0.05), progress.part(0.05, 0.1)), strict=False)
+    )
     relative = wide / np.median(spacing[anchors][region], axis=1)
     growth = np.median(wide / np.maximum(fine, np.finfo(float).tiny))
     everywhere, level = np.percentile(relative, (10, 50))
     if everywhere <= _EVERYWHERE or level <= _LEVEL or (growth >= _GROWTH and level <= _DROWNED):
         return False
-    _, confidence, _ = estimate_normals(points, spacing)
+    _, confidence, _ = estimate_normals(points, spacing, progress=progress.part(0.1, 1.0))
     return bool(np.median(confidence) < _AGREED)
 
 

@@ -22,6 +22,7 @@ _LONELY = 2.0  # spacing over that of the neighbours
 _ALONE = 5.0  # so lonely that the plane no longer matters
 _OFF = 2.0  # distance from the neighbours' plane over their spacing
 _THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a cloud .3
+_CHUNK = 16384  # samples
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
 _WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
 _COMPANY = 40  # sparse samples that vote whether they are strays
@@ -49,13 +50,14 @@ def find_outliers(points, progress=None) -> np.ndarray:
     if len(points) < MINIMUM_SAMPLES:
         return stray
     for turn in range(_ROUNDS):
-        progress(turn / _ROUNDS)
+        part = progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)
         kept = np.flatnonzero(~stray)
-        around = _Surroundings(points[kept])
+        around = _Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > _DIRTY * len(points)
-        found = around.beside(_STRICT if dirty else 1.0) | around.scattered() | around.detached()
+        found = around.beside(_STRICT if dirty else 1.0) | around.scattered(part.part(0.6, 0.7))
+        found |= around.detached()
         if dirty:
-            found |= around.hovering()
+            found |= around.hovering(part.part(0.7, 1.0))
         stray[kept[found]] = True
         if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
             break
@@ -65,40 +67,50 @@ def find_outliers(points, progress=None) -> np.ndarray:
 class _Surroundings:
     """What the nearest neighbours of each sample look like."""
 
-    def __init__(self, points):
+    def __init__(self, points, progress):
+        n = len(points)
         self.points = points
-        distance, self.neighbours = KDTree(points).query(points, k=_NEIGHBOURS + 1, workers=-1)
-        self.spacing = distance[:, 1 : SPACING_NEIGHBOURS + 1].mean(axis=1)
-        group = points[self.neighbours[:, 1:]]
-        centre = group.mean(axis=1)
-        group = group - centre[:, None]
-        squared, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", group, group))
-        extent = np.sqrt(np.maximum(squared, 0.0))
-        size = np.maximum(np.linalg.norm(extent, axis=1), np.finfo(float).tiny)
-        theirs = np.maximum(np.median(self.spacing[self.neighbours[:, 1:]], axis=1), np.finfo(float).tiny)
-        self.thickness = extent[:, 0] / size
-        curve = extent[:, 1] < _CURVE * size
+        self.spacing, self.thickness, off_plane, theirs = np.empty((4, n))
+        self.neighbours, curve = np.empty((n, _NEIGHBOURS + 1), np.int64), np.empty(n, bool)
+        tree = KDTree(points)
+        for part in progress.part(0.0, 0.9).chunks(n, _CHUNK):
+            distance, self.neighbours[part] = tree.query(points[part], k=_NEIGHBOURS + 1, workers=-1)
+            self.spacing[part] = distance[:, 1 : SPACING_NEIGHBOURS + 1].mean(axis=1)
+            group = points[self.neighbours[part, 1:]]
+            centre = group.mean(axis=1)
+            group = group - centre[:, None]
+            squared, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", group, group))
+            extent = np.sqrt(np.maximum(squared, 0.0))
+            size = np.maximum(np.linalg.norm(extent, axis=1), np.finfo(float).tiny)
+            self.thickness[part] = extent[:, 0] / size
+            curve[part] = extent[:, 1] < _CURVE * size
+            off_plane[part] = np.abs(np.einsum("ni,ni->n", points[part] - centre, axes[:, :, 0]))
+        for part in progress.part(0.9, 1.0).chunks(n, _CHUNK):
+            theirs[part] = np.median(self.spacing[self.neighbours[part, 1:]], axis=1)
+        theirs = np.maximum(theirs, np.finfo(float).tiny)
         self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5) | (curve.mean() > _WIREFRAME)
         self.lonely = self.spacing / theirs
-        self.off = np.abs(np.einsum("ni,ni->n", points - centre, axes[:, :, 0])) / theirs
+        self.off = off_plane / theirs
 
     def beside(self, share):
         off_plane = (self.lonely > share * _LONELY) & (self.off > share * _OFF)
         return (off_plane | (self.lonely > share * _ALONE)) & ~self.wire
 
-    def scattered(self):
+    def scattered(self, progress):
         found = np.zeros(len(self.points), bool)
         sparse = np.flatnonzero(self.spacing > _SPARSE * np.median(self.spacing))
         if not len(sparse):
             return found
         astray = (self.thickness > _THICK) | ((self.off > _OFF) & ~self.wire)
         k = min(_COMPANY, len(sparse))
-        around = KDTree(self.points[sparse]).query(self.points[sparse], k=k, workers=-1)[1].reshape(len(sparse), k)
-        found[sparse] = astray[sparse[around]].mean(axis=1) > _MAJORITY
+        tree = KDTree(self.points[sparse])
+        for part in progress.chunks(len(sparse), _CHUNK):
+            around = tree.query(self.points[sparse[part]], k=k, workers=-1)[1].reshape(-1, k)
+            found[sparse[part]] = astray[sparse[around]].mean(axis=1) > _MAJORITY
         return found
 
-    def hovering(self):
-        height = fit_quadrics(self.points, np.arange(len(self.points)), _FITTED).left_out()
+    def hovering(self, progress):
+        height = fit_quadrics(self.points, np.arange(len(self.points)), _FITTED, progress).left_out()
         around = np.median(height[self.neighbours], axis=1)
         return height > np.maximum(_HOVERING * around, _HOVERING_FAR * self.spacing)
 

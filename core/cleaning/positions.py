@@ -27,12 +27,12 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
     nothing is to do.
     """
+    progress = Progress.of(progress)
     if strength == "auto":
-        strength = float(is_noisy(points, spacing, seed))
+        strength = float(is_noisy(points, spacing, seed, progress.part(0.0, 0.1)))
     if strength == 0 or len(points) <= LADDER[0]:
         return points, {}
-    progress = Progress.of(progress)
-    noise = estimate_noise(points, seed, progress.part(0.0, 0.4))
+    noise = estimate_noise(points, seed, progress.part(0.1, 0.4))
     neighbours = _rounded(_SHARE * noise.neighbours, len(points))
     moved = points
     for turn in range(_PASSES):

@@ -44,13 +44,10 @@ def fit_quadrics(points, rows, neighbours: int, progress=None) -> Quadrics:
     The plane is the weighted principal plane; weights fall with the squared distance and, in a second round, with the
     residual (Cauchy), so that a few strays do not bend the fit.
     """
-    progress = Progress.of(progress)
     tree = KDTree(points)
     found = Quadrics(np.empty((len(rows), 3)), np.empty(len(rows)), np.empty(len(rows)))
     chunk = max(1, _CHUNK // neighbours)
-    for first in range(0, len(rows), chunk):
-        progress(first / len(rows))
-        part = slice(first, first + chunk)
+    for part in Progress.of(progress).chunks(len(rows), chunk):
         distance, index = tree.query(points[rows[part]], k=neighbours, workers=-1)
         offset = points[index] - points[rows[part], None]
         found.step[part], found.height[part], found.leverage[part] = _fit(offset, distance)
