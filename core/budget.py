@@ -29,7 +29,7 @@ class Estimate:
     memory_mb: float
 
 
-def estimate_cost(spacing: np.ndarray, grid: Grid) -> Estimate:
+def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings()) -> Estimate:
     """Cost of a run with default settings over clean samples with local spacing (n,), in the units of the grid.
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.

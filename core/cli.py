@@ -24,7 +24,7 @@ from .io.vdb import write_vdb
 from .pipeline import reconstruct
 from .points import local_spacing, prepare_samples
 from .reconstruction import Reconstruction
-from .settings import Settings, options
+from .settings import Settings, default_in_words, options
 
 PROGRAM = "python -m core"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
@@ -115,7 +115,7 @@ def _parser():
     text = "say what a scan holds and how large a cell would be"
     command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
     command.add_argument("scan", metavar="SCAN", type=Path, help=formats)
-    _add_settings(command, {"resolution": options()["resolution"]})
+    _add_settings(command, {name: options()[name] for name in ("resolution", "band")})
     command.add_argument("--json", action="store_true", help="print as JSON")
     command.set_defaults(run=_info)
     return parser
@@ -136,10 +136,10 @@ def _add_settings(parser, fields):
             allowed += f", or {word}"
         parser.add_argument(
             f"--{name.replace('_', '-')}",
-            metavar=field.type.__name__.upper(),
-            type=_number if field.type in (int, float) else field.type,
+            metavar="INT" if field.type is int else "FLOAT" if limits else "STR",
+            type=_number if limits else str,
             default=field.default,
-            help=f"{field.metadata['help']} ({allowed}; default {field.default})".replace("%", "%%"),
+            help=f"{field.metadata['help']} ({allowed}; default {default_in_words(field)})".replace("%", "%%"),
         )
 
 
@@ -230,14 +230,14 @@ def _summary(report):
 
 
 def _info(given):
-    resolution = Settings(resolution=given.resolution).resolution
+    settings = Settings(resolution=given.resolution, band=given.band)
     points = read_points(given.scan)
     samples = prepare_samples(points)
     nearest = KDTree(samples.points).query(samples.points, k=2, workers=-1)[0][:, 1] * samples.scale
     used = points[samples.source_index]
     finite = int(np.isfinite(points).all(axis=1).sum())
     low, high = used.min(axis=0), used.max(axis=0)
-    grid = fit_grid(used, resolution)
+    grid = fit_grid(used, settings.resolution)
     spacing = local_spacing(samples.points) * samples.scale
     facts = {
         "scan": given.scan,
@@ -247,9 +247,10 @@ def _info(given):
         "box": {"low": low, "high": high, "size": high - low},
         "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
         "spacing": np.median(spacing),
-        "resolution": resolution,
+        "resolution": settings.resolution,
+        "band": settings.band,
         "grid": {"shape": grid.shape, "cell": grid.spacing},
-        "estimate": asdict(estimate_cost(spacing, grid)),
+        "estimate": asdict(estimate_cost(spacing, grid, settings)),
     }
     print(report_json(facts) if given.json else _described(facts))
 
@@ -258,11 +259,12 @@ def _described(facts):
     low, high, size = (" ".join(f"{x:.9g}" for x in facts["box"][key]) for key in ("low", "high", "size"))
     smallest, median, largest = (f"{x:.3g}" for x in facts["nearest_neighbour"].values())
     shape = " x ".join(map(str, facts["grid"]["shape"]))
+    band = "" if facts["band"] is None else f", those within {facts['band']:g} cells of the surface alone"
     return (
         f"points   {facts['points']}, of which {facts['not_finite']} not finite and {facts['duplicates']} duplicates\n"
         f"box      {low} to {high}, size {size}\n"
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"
-        f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes\n"
+        f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes{band}\n"
         f"run      about {facts['estimate']['seconds']:.0f} s and {facts['estimate']['memory_mb']:.0f} MiB"
     )

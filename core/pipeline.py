@@ -7,17 +7,18 @@ import numpy as np
 
 from .budget import check_budget, estimate_cost
 from .cleaning.clean import clean
-from .field.distance_field import DistanceField
+from .field.distance_field import BandedField, DistanceField
 from .field.grid import fit_grid
 from .field.integration import NearBand, distance_field
 from .field.local_surface import fit_local_surface
+from .field.narrow_band import banded_field, trimmed
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .points import local_spacing, prepare_samples
 from .progress import Progress
 from .reconstruction import Reconstruction
 from .settings import Settings
-from .surface.extract import extract_surfaces
+from .surface.extract import band_for, extract_surfaces
 
 
 def reconstruct(points, settings: Settings = Settings(), constraints=None, progress=None) -> Reconstruction:
@@ -44,14 +45,14 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
     progress, stages = Progress.of(progress), _Stages()
 
     with stages("points"):
-        samples = prepare_samples(points)
+        samples, given = prepare_samples(points), len(np.asarray(points))
 
     with stages("cleaning"):
         samples, cleaning = clean(samples, settings, progress.part(0.0, 0.1, "cleaning"))
-        constraints = checked_constraints(constraints, samples.source_index)
+        constraints, ignored = checked_constraints(constraints, samples.source_index, given)
         spacing = local_spacing(samples.points)
         grid = fit_grid(samples.points, settings.resolution)
-        estimate = estimate_cost(spacing, grid)
+        estimate = estimate_cost(spacing, grid, settings)
         check_budget(estimate, len(spacing), grid, settings)
 
     with stages("normals"):
@@ -60,22 +61,28 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         )
 
     with stages("field"):
-        local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge)
-        values, band = distance_field(local, grid, settings.integration, progress.part(0.2, 0.8, "distance field"))
+        part = progress.part(0.2, 0.25, "distance field")
+        local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)
+        part = progress.part(0.25, 0.8, "distance field")
+        if settings.band is None:
+            values, near = distance_field(local, grid, settings.integration, settings.diffusion, part)
+            feet = None
+        else:
+            values, near, feet = banded_field(local, grid, band_for(settings, local, grid), part)
 
     with stages("surface"):
         part = progress.part(0.8, 1.0)
-        surfaces = extract_surfaces(values, band, local, grid, settings, samples.to_input_units, part)
+        surfaces = extract_surfaces(values, near, local, grid, settings, samples.to_input_units, part)
 
     report = {
         "settings": asdict(settings),
         "counts": {
-            "input": len(np.asarray(points)),
+            "input": given,
             "samples": len(samples.points),
             **counts,
             "rim_samples": int((local.rims.gap & ~local.rims.bridged).sum()),
             "bridged_samples": int(local.rims.bridged.sum()),
-            "nodes": int(np.prod(grid.shape)),
+            "nodes": surfaces.values.size,
         },
         "cleaning": cleaning,
         "meshes": {
@@ -87,7 +94,7 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         "seconds": stages.seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": [*samples.warnings, *surfaces.warnings],
+        "warnings": [*samples.warnings, *ignored, *surfaces.warnings],
     }
     progress(1.0)
     return Reconstruction(
@@ -95,17 +102,22 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         source_index=samples.source_index,
         normals=normals,
         confidence=confidence,
-        field=DistanceField(
-            surfaces.values * np.float32(samples.scale),
-            samples.to_input_units(grid.origin),
-            grid.spacing * samples.scale,
-            sdf="signed" in surfaces.meshes,
-        ),
+        field=_field(surfaces, feet, grid, samples, settings.band),
         surface=surfaces.meshes.get("double", surfaces.meshes.get("signed")),
         sheet=surfaces.meshes.get("single"),
-        near=NearBand(band.node, band.step * samples.scale),
+        near=NearBand(near.node, near.step * samples.scale),
         report=report,
     )
+
+
+def _field(surfaces, feet, grid, samples, band):
+    """The field in the input's units."""
+    origin, cell = samples.to_input_units(grid.origin), grid.spacing * samples.scale
+    sdf, scale = "signed" in surfaces.meshes, np.float32(samples.scale)
+    if band is None:
+        return DistanceField(surfaces.values * scale, origin, cell, sdf=sdf)
+    blocks = trimmed(surfaces.values, band * grid.spacing).map(lambda u: u * scale)
+    return BandedField(blocks, origin, cell, band * cell, sdf, feet.in_cells(grid))
 
 
 class _Stages:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .field.distance_field import DistanceField
+from .field.distance_field import BandedField, DistanceField
 from .field.integration import NearBand
 from .surface.mesh import Mesh
 
@@ -17,7 +17,7 @@ class Reconstruction:
     source_index : (n',) int64, row of each sample in the input
     normals      : (n',3) float64 unit axes; the sign carries no meaning
     confidence   : (n',) float64 in [0,1], how well the neighbours agree on the axis
-    field        : DistanceField, signed where the setting `surface` is "signed"
+    field        : DistanceField, or BandedField where the setting `band` is given; signed where `surface` is "signed"
     surface      : Mesh, closed: the double cover, or where the setting `surface` is "signed" the boundary of the
                    inside, wound outwards; None where it is "single" or "none"
     sheet        : Mesh, the single layer, where the setting `surface` is "single" or "both"; else None
@@ -29,7 +29,7 @@ class Reconstruction:
     source_index: np.ndarray
     normals: np.ndarray
     confidence: np.ndarray
-    field: DistanceField
+    field: DistanceField | BandedField
     surface: Mesh | None
     sheet: Mesh | None
     near: NearBand

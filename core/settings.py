@@ -11,9 +11,13 @@ import numpy as np
 
 from .errors import SettingsError
 
+WHOLE_BOX = 512  # cells, the finest resolution without a band
+BESIDE_OFFSET = 2  # cells that a band reaches beyond the offset, at least
+
 
 def _option(default, help, *, limits=None, choices=None, word=None, unit=""):
-    """A field; `word` is the one text that stands for a value found from the data where `limits` ask for a number."""
+    """A field; `word` is the one text that stands for a value found from the data, or for the default None, where
+    `limits` ask for a number."""
     metadata = dict(help=help, limits=limits, choices=choices, word=word, unit=unit)
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -25,8 +29,16 @@ class Settings:
     resolution: int = _option(
         128,
         "Grid cells along the longest side of the padded box. Twice the resolution shows detail half the size and "
-        "costs four to eight times the time and memory",
-        limits=(16, 512),
+        "costs four to eight times the time and memory. Beyond 512 a band is needed",
+        limits=(16, 2048),
+        unit="cells",
+    )
+    band: float | None = _option(
+        None,
+        "Evaluate the distance only this near the surface, or in the whole box. With a band, 4 for instance, time and "
+        "memory grow with the surface, not with the box; meshes are the same",
+        limits=(3.0, 32.0),
+        word="none",
         unit="cells",
     )
     bridge: float = _option(
@@ -62,6 +74,12 @@ class Settings:
         "by the published Poisson equation (less exact, the reference)",
         choices=("transport", "poisson"),
     )
+    diffusion: str = _option(
+        "kernel",
+        "Where that equation takes its directions from: the diffusion's closed-form kernels, or the published "
+        "diffusion on the grid (the reference; without rims, and for few points only, up to about 2,000)",
+        choices=("kernel", "grid"),
+    )
     backend: str = _option(
         "auto",
         "What differentiates the energy of that solver: torch, NumPy, or torch where it is installed",
@@ -96,11 +114,36 @@ class Settings:
     def __post_init__(self):
         for option in dataclasses.fields(self):
             object.__setattr__(self, option.name, _checked(option, getattr(self, option.name)))
+        if self.band is None and self.resolution > WHOLE_BOX:
+            raise SettingsError(
+                f"resolution is {self.resolution} and the whole box may have {WHOLE_BOX} cells at most; set band, for "
+                "instance to 4, or lower the resolution"
+            )
+        if self.band is not None and self.integration == "poisson":
+            raise SettingsError(
+                f"band is {self.band:g} and integration 'poisson', which solves in the whole box; leave band at none, "
+                "or use integration='transport'"
+            )
+        if self.band is not None and self.band < self.offset + BESIDE_OFFSET:
+            raise SettingsError(
+                f"band is {self.band:g} and offset {self.offset:g}; use a band of {self.offset + BESIDE_OFFSET:g} or "
+                "more, or lower the offset"
+            )
+        if self.diffusion == "grid" and self.integration != "poisson":
+            raise SettingsError(
+                f"diffusion is 'grid' and integration {self.integration!r}, which needs no directions away from the "
+                "surface; use integration='poisson' with it, or diffusion='kernel'"
+            )
 
 
 def options() -> dict[str, dataclasses.Field]:
     """Name -> field of each setting: its `.default`, `.type` and `.metadata` (help, limits, choices, word, unit)."""
     return {option.name: option for option in dataclasses.fields(Settings)}
+
+
+def default_in_words(option: dataclasses.Field):
+    """The default of a setting as a user types it: None is its word."""
+    return option.metadata["word"] if option.default is None else option.default
 
 
 def _checked(option, value):
@@ -114,8 +157,8 @@ def _checked(option, value):
             raise SettingsError(f"{name} is {value!r}; it must be True or False")
         return bool(value)
     if metadata["word"]:
-        if isinstance(value, str) and value == metadata["word"]:
-            return value
+        if isinstance(value, str) and value == metadata["word"] or value is None and option.default is None:
+            return None if option.default is None else value
         value = _number(value)
     kind = numbers.Integral if option.type is int else numbers.Real
     low, high = metadata["limits"]
@@ -123,7 +166,7 @@ def _checked(option, value):
         what = "a whole number" if option.type is int else "a number"
         word = f", or {metadata['word']!r}" if metadata["word"] else ""
         raise SettingsError(f"{name} is {value!r}; it must be {what} from {low} to {high}{word}")
-    return option.type(value)
+    return int(value) if option.type is int else float(value)
 
 
 def _number(value):

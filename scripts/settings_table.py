@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from core.settings import options
+from core.settings import default_in_words, options
 
 README = Path(__file__).resolve().parent.parent / "README.md"
 START, END = "<!-- settings -->\n", "<!-- /settings -->"
@@ -12,7 +12,7 @@ def settings_table() -> str:
     """A Markdown table with a row for each setting: name, default, what it may be, help."""
     rows = ["| Setting | Default | May be | What it does |", "|---|---|---|---|"]
     for name, option in options().items():
-        rows.append(f"| `{name}` | `{option.default}` | {_allowed(option)} | {option.metadata['help']} |")
+        rows.append(f"| `{name}` | `{default_in_words(option)}` | {_allowed(option)} | {option.metadata['help']} |")
     return "\n".join(rows) + "\n"
 
 

@@ -8,40 +8,46 @@ errs less, most of all at the medial axis, and needs no linear solve: every node
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC
+from .feet import settled_feet
 from .grid import Grid
 from .local_surface import LocalSurface
 from .poisson import poisson
 
 BAND = 2.0  # cells, where the projection distance itself is kept
-_SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
-_SETTLED = 0.1  # cells, residual of a foot point that counts
-_FOOT_RADIUS = 0.6  # cells, a foot point stands for a disc of this radius
 _ROUNDS = 2
-_SLAB = 1 << 18  # nodes
+_SLAB = 1 << 17  # nodes
 
 
 @dataclass(frozen=True)
 class NearBand:
     """The nodes within BAND cells of the surface.
 
-    node : (b,) int64, flat index in the grid     step : (b,3) float64, from the foot point to the node
+    node : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
     """
 
     node: np.ndarray
     step: np.ndarray
 
+    def rows(self, node: np.ndarray) -> np.ndarray:
+        """Where nodes (m,) stand in the band, -1 for those that do not."""
+        row = np.minimum(np.searchsorted(self.node, node), len(self.node) - 1)
+        return np.where(self.node[row] == node, row, -1)
+
 
 def distance_field(
-    surface: LocalSurface, grid: Grid, integration: str = "transport", progress=None
+    surface: LocalSurface, grid: Grid, integration: str = "transport", diffusion: str = "kernel", progress=None
 ) -> tuple[np.ndarray, NearBand]:
     """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples, and the band
-    in which it is known with its direction. Outside the band by `integration`: "transport" or "poisson"."""
+    in which it is known with its direction. Outside the band by `integration`: "transport" or "poisson", the latter
+    with directions by `diffusion`: "kernel" or "grid"."""
     progress = Progress.of(progress)
     node, bound = _near_samples(surface, grid)
     near = surface.project(grid.positions(node), progress.part(0.05, 0.6))
@@ -50,13 +56,18 @@ def distance_field(
     if integration == "poisson":
         known = np.full(grid.shape, np.nan)
         known.flat[node] = near.distance
-        values = poisson(surface, grid, known, progress.part(0.6, 1.0))
+        values = poisson(surface, grid, known, diffusion, progress.part(0.6, 1.0))
     else:
-        feet = _settled_feet(surface, grid, node, near, progress.part(0.6, 0.8))
-        values = _transport(grid, *feet, progress.part(0.8, 1.0))
+        held, feet = settled_feet(surface, grid, node, near, progress.part(0.6, 0.8))
+        values = _transport(grid, held, feet, progress.part(0.8, 1.0))
     values = np.clip(values, 0, bound)
     values.flat[node] = near.distance
     return values, NearBand(node, near.step)
+
+
+def sample_reach(surface: LocalSurface) -> np.ndarray:
+    """How far the patch of each sample covers the surface, (n,), units of the samples."""
+    return np.maximum(DISC * surface.spacing, surface.rims.reach)
 
 
 def _near_samples(surface, grid):
@@ -66,71 +77,60 @@ def _near_samples(surface, grid):
     held = np.full(grid.shape, -1, np.int32)
     held.flat[home] = np.arange(len(home), dtype=np.int32)
     reach = np.zeros(grid.shape, np.float32)
-    own = np.maximum(DISC * surface.spacing, surface.rims.reach) / grid.spacing
-    np.maximum.at(reach.reshape(-1), home, own.astype(np.float32))
+    np.maximum.at(reach.reshape(-1), home, (sample_reach(surface) / grid.spacing).astype(np.float32))
     distance, nearest = distance_transform_edt(held < 0, return_indices=True)
     nearest = np.ravel_multi_index(tuple(nearest), grid.shape)
     near = np.flatnonzero(distance <= BAND + 0.5 * np.sqrt(3) + reach.flat[nearest])
     sample = held.flat[nearest]
-    points = surface.points.astype(np.float32)
-    return near, np.concatenate([_lengths(x - points[sample[slab]]) for slab, x in _slabs(grid)])
+    points = np.ascontiguousarray(surface.points.T, np.float32)
+    bound = np.empty(grid.shape, np.float32)
+    for slab in _slabs(grid):
+        row = sample[slab]
+        bound[slab] = np.sqrt(sum((x - p[row]) ** 2 for x, p in zip(_positions(grid, slab), points, strict=True)))
+    return near, bound
 
 
-def _settled_feet(surface, grid, node, near, progress):
-    """Nodes close to the surface, (s,), their foot points that survive a second projection, (s,3), the unit normal
-    there, (s,3), and the radius for which a foot point stands: 0 on rims, (s,)."""
-    seed = near.distance <= _SEED_BAND * grid.spacing
-    node, near = node[seed], near[seed]
-    feet = grid.positions(node) - near.step
-    again = surface.project(feet, progress)
-    kept = again.distance <= _SETTLED * grid.spacing
-    node, near, feet = node[kept], near[kept], feet[kept] - again.step[kept]
-    normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
-    return node, feet, normals, np.where(near.past_rim, 0.0, _FOOT_RADIUS * grid.spacing)
-
-
-def _transport(grid, node, feet, normals, radius, progress):
+def _transport(grid, node, feet, progress):
     row = np.full(grid.shape, -1, np.int32)
     row.flat[node] = np.arange(len(node), dtype=np.int32)
     nearest = distance_transform_edt(row < 0, return_distances=False, return_indices=True)
     row = row[tuple(nearest)]
     del nearest
-    discs = feet.astype(np.float32), normals.astype(np.float32), radius.astype(np.float32)
-    values = np.empty(grid.shape, np.float32)
+    values = np.full(grid.shape, np.inf, np.float32)
+    changed = np.ones(grid.shape, bool)
     for turn in range(_ROUNDS):
         held = row.copy()
-        for slab, at in _slabs(grid):
-            progress((turn + slab.start / grid.shape[0]) / _ROUNDS)
-            best = _distance_to_discs(at, *discs, row[slab])
-            for other in _neighbours(row, slab):
-                distance = _distance_to_discs(at, *discs, other)
-                closer = distance < best
-                best[closer] = distance[closer]
-                held[slab][closer] = other[closer]
-            values[slab] = best
-        row = held
+        slabs = progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS).each(_slabs(grid))
+        for _ in in_order(partial(_take_closest, grid, feet, row, changed, held, values), slabs):
+            pass
+        changed, row = held != row, held
     return values
 
 
+def _take_closest(grid, feet, row, changed, held, values, slab):
+    """Where a foot of a neighbour that changed is closer than a node's own, put it into `held` and its distance into
+    `values`."""
+    at, mine, best = _positions(grid, slab).reshape(3, -1), held[slab].reshape(-1), values[slab].reshape(-1)
+    np.minimum(best, feet.distance(at, mine), out=best)
+    for other, fresh in zip(_neighbours(row, slab), _neighbours(changed, slab), strict=True):
+        other = other.reshape(-1)
+        tried = np.flatnonzero(fresh.reshape(-1) & (other != mine))
+        distance = feet.distance(at[:, tried], other[tried])
+        closer = distance < best[tried]
+        tried = tried[closer]
+        best[tried], mine[tried] = distance[closer], other[tried]
+
+
 def _slabs(grid):
-    """Slices of the first axis and the positions of their nodes, (s,ny,nz,3) float32, a bounded number at a time."""
-    x = [(grid.origin[a] + grid.spacing * np.arange(grid.shape[a])).astype(np.float32) for a in range(3)]
+    """Slices of the first axis with a bounded number of nodes."""
     thickness = max(1, _SLAB // (grid.shape[1] * grid.shape[2]))
-    for first in range(0, grid.shape[0], thickness):
-        slab = slice(first, min(first + thickness, grid.shape[0]))
-        yield slab, np.stack(np.meshgrid(x[0][slab], x[1], x[2], indexing="ij"), axis=-1)
+    return [slice(first, min(first + thickness, grid.shape[0])) for first in range(0, grid.shape[0], thickness)]
 
 
-def _lengths(vectors):
-    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
-
-
-def _distance_to_discs(x, centres, normals, radius, row):
-    """Distance to the disc that each foot point stands for."""
-    offset = x - centres[row]
-    height = np.einsum("...i,...i->...", offset, normals[row])
-    lateral = np.sqrt(np.maximum(np.einsum("...i,...i->...", offset, offset) - height**2, 0))
-    return np.hypot(height, np.maximum(lateral - radius[row], 0))
+def _positions(grid, slab):
+    """Positions of the nodes of a slab, (3,s,ny,nz) float32."""
+    x = [(grid.origin[a] + grid.spacing * np.arange(grid.shape[a])).astype(np.float32) for a in range(3)]
+    return np.stack(np.meshgrid(x[0][slab], x[1], x[2], indexing="ij"))
 
 
 def _neighbours(row, slab):

@@ -6,6 +6,7 @@ from scipy.ndimage import map_coordinates
 
 from ..progress import Progress
 from .grid import Grid
+from .grid_diffusion import check_held, grid_axes
 from .local_surface import LocalSurface
 
 STRIDE = 2  # the far field is solved on every second node
@@ -14,24 +15,38 @@ _TOLERANCE = 1e-4  # of the residual, relative
 _MAX_ITERATIONS = 200
 
 
-def poisson(surface: LocalSurface, grid: Grid, known: np.ndarray, progress=None) -> np.ndarray:
+def poisson(
+    surface: LocalSurface, grid: Grid, known: np.ndarray, diffusion: str = "kernel", progress=None
+) -> np.ndarray:
     """Distance at every node, float32 of the grid's shape, from the distances `known` near the surface (NaN elsewhere).
 
     Minimises the squared difference between the slope of u along every edge of the grid of every second node and the
     fused directions Y_f there, with u held softly at the known distances, by conjugate gradients preconditioned with
     the cosine transform of the Laplacian. Departs from the paper in the anchor: u = 0 at points off the grid alone is
     slow to solve and no more accurate.
+
+    diffusion : where the directions come from. "kernel": projections onto the surface, which ends at rims; "grid": the
+    paper's diffusion on the grid of all nodes, which knows no rims
+
+    Raises :class:`SettingsError` where that grid or float64 cannot hold the diffusion.
     """
     progress = Progress.of(progress)
     known = known[::STRIDE, ::STRIDE, ::STRIDE]
     coarse = Grid(grid.origin, STRIDE * grid.spacing, known.shape)
-    found = surface.project(coarse.positions(np.arange(known.size)), progress.part(0.0, 0.5))
-    direction = found.step / np.maximum(found.distance, np.finfo(float).tiny)[:, None]
+    nodes = coarse.positions(np.arange(known.size))
+    if diffusion == "grid":
+        start, _ = surface.tree.query(nodes, workers=-1)
+        check_held(surface.spacing, grid, start.max())
+        samples = surface.points, surface.normals, surface.spacing
+        direction = grid_axes(*samples, grid, STRIDE, progress.part(0.0, 0.5))
+    else:
+        found = surface.project(nodes, progress.part(0.0, 0.5))
+        start, direction = found.distance, found.step / np.maximum(found.distance, np.finfo(float).tiny)[:, None]
     direction = direction.reshape(*known.shape, 3) * coarse.spacing
 
     anchor = np.where(np.isnan(known), 0.0, _ANCHOR)
     right = anchor * np.nan_to_num(known) - _divergence(direction)
-    solution = _solve(anchor, right, found.distance.reshape(known.shape), progress.part(0.5, 1.0))
+    solution = _solve(anchor, right, start.reshape(known.shape), progress.part(0.5, 1.0))
     at = np.indices(grid.shape, np.float32) / STRIDE
     return map_coordinates(solution, at, order=1, mode="nearest", output=np.float32)
 

@@ -6,7 +6,10 @@ from functools import cache
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from ..errors import MissingDependency
+from ..field.blocks import SIDE, Blocks
 
 _REMEDY = "run inside Blender 4.5 or newer, or `pip install bpy`, which carries it"
 
@@ -24,6 +27,23 @@ def load_openvdb() -> ModuleType:
     except ModuleNotFoundError:
         return _load_from_bpy_wheel()
     return openvdb
+
+
+def fill(grid, values: np.ndarray | Blocks) -> None:
+    """Fill a grid. Of the constant blocks of :class:`Blocks` the negative ones become tiles, the others background."""
+    if isinstance(values, np.ndarray):
+        grid.copyFromArray(values)
+        return
+    shape = np.array(values.shape)
+    for corner, block in zip(values.corners().tolist(), values.stored, strict=True):
+        grid.copyFromArray(block, tuple(corner))
+    constant = (values.slot < 0) & (values.outer < 0)
+    for i, j in zip(*np.nonzero(constant.any(axis=2)), strict=True):
+        edge = np.flatnonzero(np.diff(constant[i, j], prepend=False, append=False))
+        for first, end in edge.reshape(-1, 2).tolist():
+            high = np.minimum((SIDE * (i + 1), SIDE * (j + 1), SIDE * end), shape) - 1
+            low = (int(SIDE * i), int(SIDE * j), SIDE * first)
+            grid.fill(low, tuple(high.tolist()), values.outer[i, j, first].item(), False)
 
 
 def _load_from_bpy_wheel():

@@ -70,12 +70,9 @@ def node_strides(grid: Grid) -> np.ndarray:
 def _sides(band, grid):
     """Cells with all corners in the band, by their lowest node, (c,) ascending, and each corner's signed distance along
     the cell's normal, (c,8); the sign is the cell's own."""
-    row = np.full(grid.shape, -1, np.int32)
-    row.flat[band.node] = np.arange(len(band.node), dtype=np.int32)
-    inner = np.zeros(grid.shape, bool)
-    inner[:-1, :-1, :-1] = True
-    lowest = band.node[inner.flat[band.node]]
-    corner = row.flat[lowest[:, None] + _CORNERS @ node_strides(grid)]
+    at = np.stack(np.unravel_index(band.node, grid.shape), axis=1)
+    lowest = band.node[(at < np.array(grid.shape) - 1).all(axis=1)]
+    corner = np.stack([band.rows(lowest + step) for step in _CORNERS @ node_strides(grid)], axis=1)
     whole = (corner >= 0).all(axis=1)
     lowest, corner = lowest[whole], corner[whole]
     step = band.step[corner] + _HAIR * grid.spacing

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..field.blocks import each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
@@ -11,14 +12,15 @@ from .pieces import pieces_with_samples
 from .triangles import triangles
 
 _ROUNDS = 2
-_CLAMP = 2.0  # cells beyond the offset; farther nodes do not matter and are made background
+CLAMP = 2.0  # cells beyond the offset; farther nodes do not matter and are made background
 _LONGEST_STEP = 2.0  # offsets
 
 
 def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:
     """The iso-surface of the distance field at `offset` cells, pulled onto the zero set.
 
-    values : (nx,ny,nz) float32 distances at the grid's nodes, units of the samples
+    values : (nx,ny,nz) float32 or Blocks, distances at the grid's nodes, units of the samples; in Blocks those up to
+             CLAMP cells beyond the offset
 
     The idea of shrinking a double cover is DCUDF's (Hou et al., ACM TOG 42(6), 2023); here every vertex goes straight
     to its foot point on the local surface, twice, instead of descending a mesh energy. The mesh is closed and each of
@@ -27,7 +29,7 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
     """
     progress = Progress.of(progress)
     level = np.float32(offset * grid.spacing)
-    clamped = np.minimum(values, np.float32(level + _CLAMP * grid.spacing))
+    clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)
     cells, faces = isosurface(clamped, level)
     vertices = grid.origin + grid.spacing * cells
     for turn in range(_ROUNDS):

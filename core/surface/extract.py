@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..field.blocks import Blocks
 from ..field.grid import Grid
 from ..field.integration import NearBand
 from ..field.local_surface import LocalSurface
@@ -12,7 +13,7 @@ from ..settings import Settings
 from .crossings import find_crossings
 from .double_cover import double_cover
 from .mesh import Mesh
-from .sides import find_sides
+from .sides import find_sides, needed_band
 from .signed import signed_distance, signed_mesh
 from .single_layer import single_layer
 
@@ -21,12 +22,12 @@ from .single_layer import single_layer
 class Surfaces:
     """What was extracted, in the units of the samples.
 
-    values   : (nx,ny,nz) float32, the distances, signed where a signed surface was asked for
+    values   : (nx,ny,nz) float32 or Blocks, the distances, signed where a signed surface was asked for
     meshes   : by kind: "double", "signed", "single"
     warnings : where a mesh is less than was asked for, one line each
     """
 
-    values: np.ndarray
+    values: np.ndarray | Blocks
     meshes: dict[str, Mesh] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
@@ -35,10 +36,16 @@ class Surfaces:
         return replace(self, meshes={kind: Mesh(place(m.vertices), m.faces) for kind, m in self.meshes.items()})
 
 
+def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
+    """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
+    with_sides = settings.surface in ("single", "both", "signed")
+    return max(settings.band, needed_band(local, grid)) if with_sides else settings.band
+
+
 def extract_surfaces(
     values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
 ) -> Surfaces:
-    """The meshes that `settings.surface` names, from distances `values` (nx,ny,nz) float32 and the band near it.
+    """The meshes that `settings.surface` names, from distances `values` (nx,ny,nz) float32 or Blocks and the band near it.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed.

@@ -3,23 +3,29 @@
 import numpy as np
 
 from ..errors import MissingDependency
-from ..io.openvdb_module import load_openvdb
+from ..field.blocks import Blocks
+from ..io.openvdb_module import fill, load_openvdb
 
 
-def isosurface(values: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
+def isosurface(values: np.ndarray | Blocks, level: float) -> tuple[np.ndarray, np.ndarray]:
     """The surface where `values` (nx,ny,nz) float32 equals `level`, normals towards larger values; closed where it
     meets the box, beyond which the largest value holds.
 
     Returns vertices (v,3) float64 in grid coordinates (cells) and faces (f,4) or (f,3) int64: quads from OpenVDB's
-    dual contouring, closed and edge-manifold, or triangles from scikit-image's marching cubes.
+    dual contouring, closed and edge-manifold, or triangles from scikit-image's marching cubes, of whole boxes only.
     Raises :class:`MissingDependency` where neither library is found.
     """
     try:
         openvdb = load_openvdb()
-    except MissingDependency:
+    except MissingDependency as error:
+        if isinstance(values, Blocks):
+            raise MissingDependency(
+                f"a surface from a band needs OpenVDB: {error}; or leave band out, or ask for surface='none'"
+            ) from error
         return _by_marching_cubes(values, level)
-    grid = openvdb.FloatGrid(background=float(values.max()))
-    grid.copyFromArray(values)
+    beyond = values.outer.max() if isinstance(values, Blocks) else values.max()
+    grid = openvdb.FloatGrid(background=float(beyond))
+    fill(grid, values)
     vertices, quads = grid.convertToQuads(isovalue=float(level))
     return vertices.astype(np.float64), quads.astype(np.int64)
 

@@ -13,17 +13,18 @@ sides: a hollow ball is inside between its walls, and outside within.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import label
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
 
+from ..field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from .crossings import Crossings, node_strides
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
+_BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
 _SPECK = 27  # nodes
 _TOLERANCE = 1e-3
 _ADJACENT = 1.8  # cells, crossings of one patch
@@ -35,7 +36,7 @@ _PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening 
 class Sides:
     """The inside, and the crossings that contradict it.
 
-    inside    : (nx,ny,nz) bool
+    inside    : (nx,ny,nz) bool, or Blocks of it
     alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
                 an open surface
     within    : (w,) bool, whether that side is the inside
@@ -44,7 +45,7 @@ class Sides:
     largest   : float, the largest connected patch of either, relative to all crossings
     """
 
-    inside: np.ndarray
+    inside: np.ndarray | Blocks
     alike: np.ndarray
     within: np.ndarray
     share: float
@@ -61,55 +62,66 @@ class Sides:
         """Whether what bounds the inside is the surface and nothing else, but for specks."""
         return self.closed and self.largest <= _PATCH
 
-    def sign(self, values: np.ndarray) -> np.ndarray:
+    def sign(self, values: np.ndarray | Blocks) -> np.ndarray | Blocks:
         """Distances (nx,ny,nz) with their signs: negative inside."""
-        return np.where(self.inside, -values, values)
+        return each(lambda inside, u: np.where(inside, -u, u), self.inside, values)
 
 
 def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid) -> Sides:
-    """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32 and the crossed grid edges.
+    """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32, or Blocks of a band wider than
+    :func:`needed_band`, and the crossed grid edges.
 
     Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges.
     """
-    far = 0.5 * surface.bridge * float(np.median(surface.spacing)) / grid.spacing
-    near = np.zeros(grid.shape, bool)
-    inner = (slice(1, -1),) * 3
-    near[inner] = values[inner] <= np.clip(far, _NEAREST, _FARTHEST) * grid.spacing
-    regions, count = label(~near)
-    outside = int(regions[0, 0, 0]) - 1
-    cluster = regions.reshape(-1) - 1
-    cluster[near.reshape(-1)] = count + np.arange(near.sum())
-    a, b, crossed = _edges_of(np.flatnonzero(near), crossings, grid)
-    inside = _sides(cluster[a], cluster[b], crossed, count + int(near.sum()), outside)[cluster] < 0
-    _drop_specks(inside.reshape(grid.shape))
+    limit = np.float32(_far(surface, grid) * grid.spacing)
+    near = each(lambda u, inner: inner & (u <= limit), values, inner_nodes(values))
+    labels, count = regions(each(np.logical_not, near))
+    outside = int(at_nodes(labels, np.array([0]))[0]) - 1
+    node = marked_nodes(near)
+    cluster = each(lambda label: label.astype(np.int32) - 1, labels)
+    put(cluster, node, count + np.arange(len(node)))
+    a, b, crossed = _edges_of(node, near, crossings, grid)
+    side = _sides(at_nodes(cluster, a), at_nodes(cluster, b), crossed, count + len(node), outside) < 0
+    inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster))
 
-    differ = inside[a] != inside[b]
+    inside_a = at_nodes(inside, a)
+    differ = inside_a != at_nodes(inside, b)
     alike, spanned = crossed & ~differ, ~crossed & differ
     middle = 0.5 * (grid.positions(a) + grid.positions(b))
     reach = _ADJACENT * grid.spacing
     largest = max(_largest_patch(middle[alike], reach), _largest_patch(middle[spanned], reach))
     total = max(int(crossed.sum()), 1)
     return Sides(
-        inside=inside.reshape(grid.shape),
+        inside=inside,
         alike=middle[alike],
-        within=inside[a[alike]],
+        within=inside_a[alike],
         share=int(alike.sum()) / total,
         spanned=int(spanned.sum()) / total,
         largest=largest / total,
     )
 
 
-def _edges_of(near, crossings, grid):
-    """Grid edges with an end among the `near` nodes: their ends (e,), (e,) and whether the surface crosses them."""
-    at = np.stack(np.unravel_index(near, grid.shape), axis=1)
-    strides = node_strides(grid)
+def needed_band(surface: LocalSurface, grid: Grid) -> float:
+    """Cells from the surface up to which :func:`find_sides` needs distances."""
+    return _far(surface, grid) + _BESIDE
+
+
+def _far(surface, grid):
+    """Cells from the surface where regions start."""
+    far = 0.5 * surface.bridge * float(np.median(surface.spacing)) / grid.spacing
+    return float(np.clip(far, _NEAREST, _FARTHEST))
+
+
+def _edges_of(node, near, crossings, grid):
+    """Grid edges with an end among the nodes, those marked in `near`, none of which lies on the side of the box: their
+    ends (e,), (e,) and whether the surface crosses them."""
     keys = []
-    for axis in range(3):
-        keys += [3 * near[at[:, axis] < grid.shape[axis] - 1] + axis]
-        keys += [3 * (near[at[:, axis] > 0] - strides[axis]) + axis]
-    keys = np.unique(np.concatenate(keys))
+    for axis, stride in enumerate(node_strides(grid)):
+        below = node - stride
+        keys += [3 * node + axis, 3 * below[~at_nodes(near, below)] + axis]
+    keys = np.concatenate(keys)
     node, axis = np.divmod(keys, 3)
-    return node, node + strides[axis], np.isin(keys, 3 * crossings.node + crossings.axis)
+    return node, node + node_strides(grid)[axis], np.isin(keys, 3 * crossings.node + crossings.axis)
 
 
 def _sides(a, b, crossed, n, outside):
@@ -127,13 +139,14 @@ def _sides(a, b, crossed, n, outside):
     return side
 
 
-def _drop_specks(side):
-    """Turn over, in place, connected sets of less than _SPECK nodes on one side."""
-    for inside in (True, False):
-        part, _ = label(side == inside)
-        small = np.bincount(part.reshape(-1)) < _SPECK
+def _without_specks(inside):
+    """With connected sets of less than _SPECK nodes on one side turned over."""
+    for side in (True, False):
+        part, _ = regions(each(lambda here: here == side, inside))  # noqa: B023  called at once
+        small = counts(part) < _SPECK
         small[0] = False
-        side[small[part]] = not inside
+        inside = each(lambda here, name: here ^ small[name], inside, part)  # noqa: B023
+    return inside
 
 
 def _largest_patch(middle, reach):

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 
 from ..errors import InputError
+from ..field.blocks import Blocks, each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
@@ -22,8 +23,8 @@ _ROUNDS = 2
 _SMOOTHING = 20  # rounds, over gaps
 
 
-def signed_distance(values, sides: Sides, surface: LocalSurface, place) -> np.ndarray:
-    """The distances `values` (nx,ny,nz) float32 with the sign of their side: negative inside.
+def signed_distance(values, sides: Sides, surface: LocalSurface, place) -> np.ndarray | Blocks:
+    """The distances `values` (nx,ny,nz) float32 or Blocks with the sign of their side: negative inside.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` for a shape that is not closed: where more than 5 % of the surface has one side on both
@@ -35,11 +36,11 @@ def signed_distance(values, sides: Sides, surface: LocalSurface, place) -> np.nd
 
 
 def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
-    """The zero set of signed distances (nx,ny,nz) float32, pulled onto the surface where that is within a cell, and
+    """The zero set of signed distances (nx,ny,nz) float32 or Blocks, pulled onto the surface where that is within a cell, and
     smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards."""
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
-    cells, faces = isosurface(np.clip(values, -limit, limit), 0.0)
+    cells, faces = isosurface(each(lambda u: np.clip(u, -limit, limit), values), 0.0)
     vertices = grid.origin + grid.spacing * cells
     on = surface.project(vertices, progress.part(0.0, 0.4)).distance <= grid.spacing
     for turn in range(_ROUNDS):

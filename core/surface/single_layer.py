@@ -20,7 +20,7 @@ _ROUNDS = 2
 def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None):
     """The surface as one sheet: the boundary of the inside, where that is the whole surface; else :func:`dual_contour`.
 
-    values : (nx,ny,nz) float32, unsigned distances
+    values : (nx,ny,nz) float32 or Blocks, unsigned distances
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     if sides.complete:

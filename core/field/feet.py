@@ -1,0 +1,72 @@
+"""Foot points on the surface, from which distances further out are measured."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from .grid import Grid
+from .local_surface import LocalSurface, Projection
+
+SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
+_SETTLED = 0.1  # cells, residual of a foot point that counts
+_RADIUS = 0.6  # cells, a foot point stands for a disc of this radius
+_CHUNK = 1 << 17
+
+
+@dataclass(frozen=True)
+class Feet:
+    """Foot points and the discs that they stand for.
+
+    centres, normals : (3,s) float32, unit normals     radius : (s,) float32, 0 on rims
+    """
+
+    centres: np.ndarray
+    normals: np.ndarray
+    radius: np.ndarray
+
+    @cached_property
+    def tree(self) -> KDTree:
+        return KDTree(self.centres.T, balanced_tree=False, compact_nodes=False)
+
+    def distance(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
+        """Distances from x (3,...) float32 to the discs number `row` (...)."""
+        height, squared = 0.0, 0.0
+        for x_a, centre, normal in zip(x, self.centres, self.normals, strict=True):
+            offset = x_a - centre[row]
+            height = height + offset * normal[row]
+            squared = squared + offset * offset
+        height *= height
+        lateral = np.sqrt(np.maximum(squared - height, 0)) - self.radius[row]
+        return np.sqrt(height + np.maximum(lateral, 0) ** 2)
+
+    def distances(self, x: np.ndarray) -> np.ndarray:
+        """Distances (m,) float64 from x (m,3) to the disc of the nearest foot; inf where there are no feet."""
+        found = np.full(len(x), np.inf)
+        for first in range(0, len(x) if len(self.radius) else 0, _CHUNK):
+            part = slice(first, first + _CHUNK)
+            row = self.tree.query(x[part], workers=-1)[1]
+            found[part] = self.distance(x[part].T.astype(np.float32), row)
+        return found
+
+    def in_cells(self, grid: Grid) -> "Feet":
+        """The same in the grid's index space: node (i,j,k) lies at (i,j,k)."""
+        centres = (self.centres - grid.origin[:, None]) / grid.spacing
+        return Feet(centres.astype(np.float32), self.normals, self.radius / np.float32(grid.spacing))
+
+
+def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, progress) -> tuple[np.ndarray, Feet]:
+    """Nodes close to the surface whose foot points survive a second projection, (s,) of `node` (b,), and those feet.
+
+    near : where the nodes fall on the surface
+    """
+    seed = near.distance <= SEED_BAND * grid.spacing
+    node, near = node[seed], near[seed]
+    feet = grid.positions(node) - near.step
+    again = surface.project(feet, progress)
+    kept = again.distance <= _SETTLED * grid.spacing
+    node, near, feet = node[kept], near[kept], feet[kept] - again.step[kept]
+    normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
+    radius = np.where(near.past_rim, 0.0, _RADIUS * grid.spacing)
+    return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in (feet, normals, radius)))
