@@ -1,15 +1,17 @@
 VENV := .venv
 RUN := $(VENV)/bin/python
 READY := $(VENV)/.ready
+PEERS_READY := $(VENV)/.peers-ready
+BENCH := build/bench
 
 # The first of these that runs, is 3.11 or 3.13 (those that Blender is built for) and can make an environment.
 SUITS := import ensurepip, sys, venv; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 13)])
 PYTHON ?= $(shell for p in python3.13 python3.11 python3; do $$p -c '$(SUITS)' 2>/dev/null && echo $$p && break; done)
 
-.PHONY: help demo test gui-test lint format zip bench clean
+.PHONY: help demo test gui-test lint format zip bench bench-full clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
 	@echo "PYTHON=... picks the interpreter (3.11 or 3.13) that makes $(VENV)."
 
 demo: $(READY) ## reconstruct the bundled scan into demo/, with a picture
@@ -32,8 +34,13 @@ format: $(READY) ## let ruff fix what it can
 zip: $(READY) ## build and validate the Blender extension into dist/
 	$(RUN) scripts/build_extension.py
 
-bench: $(READY) ## measure quality and speed; CASES=folder holds the point clouds
-	$(RUN) -m benchmarks $(CASES)
+bench: $(PEERS_READY) ## compare with other ways on a few shapes (minutes); CASES=folder brings your own
+	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH)-quick --quick)
+	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)-quick) --peer --save build/results $(ARGS)
+
+bench-full: $(PEERS_READY) ## the same on all shapes and samplings, timed three times, into docs/bench.md (about 2 hours)
+	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH))
+	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)) --results --page bench --repeats 3
 
 clean: ## remove what the other targets made, the environment included
 	rm -rf $(VENV) demo dist build .pytest_cache .ruff_cache .hypothesis
@@ -43,4 +50,8 @@ $(READY): requirements.txt
 	@"$(PYTHON)" -c '$(SUITS)' || { echo "$(PYTHON) does not suit: Python 3.11 or 3.13 with venv and pip is needed"; exit 2; }
 	"$(PYTHON)" -m venv --clear $(VENV)
 	$(RUN) -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@touch $@
+
+$(PEERS_READY): $(READY) benchmarks/requirements.txt
+	$(RUN) -m pip install --quiet --disable-pip-version-check -r benchmarks/requirements.txt
 	@touch $@

@@ -13,8 +13,9 @@ from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 from core.settings import options
 
+from .against import peer_tables
 from .cases import find_cases, has_sampling
-from .peers import check_open3d
+from .peers import check_open3d, peer_libraries
 from .report import comparison, markdown_tables, read_run, terminal_header, terminal_row
 from .results import write_results
 from .run import run_cases
@@ -47,12 +48,14 @@ def _parser():
     parser.add_argument(
         "--set", metavar="NAME=VALUE", type=_assignment, nargs="+", default=[], help=f"settings: {', '.join(options())}"
     )
-    parser.add_argument("--peer", action="store_true", help="also run the references (needs open3d)")
+    parser.add_argument("--peer", action="store_true", help="also run the peers (needs open3d, and cgal for one)")
+    parser.add_argument("--repeats", metavar="N", type=_count, default=1, help="time everything so often (default: 1)")
     parser.add_argument("--save", metavar="NAME", type=Path, help="write NAME.json and NAME.md")
     parser.add_argument("--compare", metavar="JSON", type=Path, help="say what changed since a saved run")
     parser.add_argument(
         "--results", action="store_true", help="run everything, both samplings, with the peers; write docs/results.md"
     )
+    parser.add_argument("--page", metavar="NAME", default="results", help="with --results: write docs/NAME.md instead")
     return parser
 
 
@@ -66,6 +69,12 @@ def _assignment(text):
         return name, value
 
 
+def _count(text):
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of repeats; write 1 or more")
+    return int(text)
+
+
 def _benchmark(given):
     chosen = dict(given.set) | ({} if given.resolution is None else {"resolution": given.resolution})
     settings = Settings(**chosen)
@@ -75,7 +84,7 @@ def _benchmark(given):
         if chosen or given.cases or given.blue_noise or given.save or given.compare:
             raise SettingsError("--results covers all cases at the default settings; drop the other options")
         runs = {sampling: _run(given, sampling, settings, True) for sampling in ("uniform", "blue noise")}
-        print(f"wrote {write_results(runs)}")
+        print(f"wrote {write_results(runs, given.page)}")
         return _status(*runs.values())
 
     earlier = read_run(given.compare) if given.compare else None
@@ -98,15 +107,17 @@ def _run(given, sampling, settings, with_peers):
     for path in found:
         if path not in paths:
             print(f"{path.stem} has no {sampling} samples and is left out")
-    print(terminal_header())
+    print(terminal_header(), flush=True)
     cases = []
-    for result in run_cases(paths, sampling, settings, with_peers):
+    for result in run_cases(paths, sampling, settings, with_peers, given.repeats):
         print(terminal_row(result), flush=True)
         cases.append(result)
-    libraries = {name: version(name) for name in (*_LIBRARIES, *(["open3d"] if with_peers else []))}
+    names = [*_LIBRARIES, *(module.lower() for module in peer_libraries() if with_peers)]
+    libraries = {name: version(name) for name in names}
     return {
         "sampling": sampling,
         "settings": asdict(settings),
+        "repeats": given.repeats,
         "versions": {"python": platform.python_version(), **libraries},
         "cases": cases,
     }
@@ -116,7 +127,8 @@ def _save(run, stem):
     path = stem.with_name(f"{stem.name}.json")
     write_report(path, run)
     with atomic_path(stem.with_name(f"{stem.name}.md")) as temporary:
-        temporary.write_text(f"# {stem.name}: {run['sampling']} samples\n\n{markdown_tables(run['cases'])}", "utf-8")
+        tables = f"{markdown_tables(run['cases'])}\n{peer_tables(run['cases'])}"
+        temporary.write_text(f"# {stem.name}: {run['sampling']} samples\n\n{tables}", "utf-8")
     print(f"wrote {path} and {stem.name}.md")
 
 

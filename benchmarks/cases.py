@@ -7,6 +7,8 @@ points_pd, normals_pd : (n,3), a blue-noise sampling of the same surface; may be
 gt_v, gt_f            : (v,3) and (f,3), the true mesh
 nm_curve              : (m,3), samples of the curves where sheets meet or cross; may be empty
 meta                  : JSON text with at least `category`, `license` and `origin`
+
+`python -m benchmarks.make_cases` makes such files.
 """
 
 import json
@@ -20,6 +22,7 @@ import numpy as np
 from core import InputError, Mesh
 
 SAMPLINGS = {"uniform": ("points", "normals"), "blue noise": ("points_pd", "normals_pd")}
+SPOILED = {"noisy", "outliers", "holes", "wireframe"}  # categories whose points are no clean sampling of the surface
 _TRUTH = ("gt_v", "gt_f", "nm_curve", "meta")
 
 

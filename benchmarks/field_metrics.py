@@ -97,11 +97,16 @@ def above_nearest_sample(field: DistanceField, samples: np.ndarray, x: np.ndarra
 
 
 def past_rims(field: DistanceField, truth: Mesh, seed: int = 0) -> dict:
-    """u / d past open rims, for each of RIM_STEPS cells out: mean, p05 and p95 (percentiles) and the number of points.
+    """u / d past open rims, for each of RIM_STEPS cells out: see :func:`ratios`; {} where the truth has no border."""
+    probes = rim_probes(field, truth, seed)
+    return {str(cells): ratios(field.sample(x), distance) for cells, (x, distance) in probes.items()}
+
+
+def rim_probes(field: DistanceField, truth: Mesh, seed: int = 0) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Points past the rim and their true distances, for each of RIM_STEPS cells out; {} where the truth has no border.
 
     Points leave the border edges at up to 60 degrees from the sheet's own direction and count where the border is the
-    nearest part of the truth (exact distance within 0.1 % of the step) and the box contains them. {} where the truth
-    has no border.
+    nearest part of the truth (exact distance within 0.1 % of the step) and the box contains them.
     """
     rng = np.random.default_rng(seed)
     border, outward, up = border_points(truth, SAMPLES, rng)
@@ -109,18 +114,23 @@ def past_rims(field: DistanceField, truth: Mesh, seed: int = 0) -> dict:
         return {}
     tilt = rng.uniform(-_RIM_TILT, _RIM_TILT, (len(border), 1))
     direction = np.cos(tilt) * outward + np.sin(tilt) * up
-    return {str(cells): _ratios(field, truth, border, direction, cells * field.spacing) for cells in RIM_STEPS}
+    low, high = field.origin, field.origin + field.spacing * (np.array(field.values.shape) - 1)
+    probes = {}
+    for cells in RIM_STEPS:
+        step = cells * field.spacing
+        x, distance, _ = _reached(field, truth, border + step * direction)
+        counted = (np.abs(distance - step) < 1e-3 * step) & ((x >= low) & (x <= high)).all(axis=1)
+        probes[cells] = x[counted], distance[counted]
+    return probes
 
 
-def _ratios(field, truth, border, direction, step):
-    x, distance, _ = _reached(field, truth, border + step * direction)
-    high = field.origin + field.spacing * (np.array(field.values.shape) - 1)
-    counted = (np.abs(distance - step) < 1e-3 * step) & ((x >= field.origin) & (x <= high)).all(axis=1)
-    if counted.sum() < _FEWEST:
-        return {"mean": None, "p05": None, "p95": None, "points": int(counted.sum())}
-    ratio = field.sample(x[counted]) / distance[counted]
+def ratios(u: np.ndarray, distance: np.ndarray) -> dict:
+    """Of u / d: mean, off (mean |u / d - 1|), p05 and p95 (percentiles) and the number of points, all (m,) given."""
+    if len(u) < _FEWEST:
+        return {"mean": None, "off": None, "p05": None, "p95": None, "points": len(u)}
+    ratio = u / distance
     p05, p95 = np.percentile(ratio, [5, 95])
-    return {"mean": ratio.mean(), "p05": p05, "p95": p95, "points": len(ratio)}
+    return {"mean": ratio.mean(), "off": np.abs(ratio - 1).mean(), "p05": p05, "p95": p95, "points": len(ratio)}
 
 
 def _reached(field, truth, x):

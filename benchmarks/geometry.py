@@ -12,12 +12,31 @@ def closest_points(x: np.ndarray, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(squared), foot
 
 
+def closest_faces(x: np.ndarray, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (m,) from points `x` (m,3) to the nearest triangle, and its index (m,)."""
+    squared, face, _ = igl.point_mesh_squared_distance(x, mesh.vertices, mesh.faces.astype(np.int64))
+    return np.sqrt(squared), face
+
+
 def surface_points(mesh: Mesh, count: int, rng: np.random.Generator) -> np.ndarray:
     """Points (count,3) on the mesh, uniform by area."""
+    return surface_samples(mesh, count, rng)[0]
+
+
+def surface_samples(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Points (count,3) on the mesh, uniform by area, and the triangle (count,) that each lies on."""
     areas = mesh.face_areas()
-    a, b, c = mesh.vertices[mesh.faces[rng.choice(len(areas), count, p=areas / areas.sum())]].transpose(1, 0, 2)
+    face = rng.choice(len(areas), count, p=areas / areas.sum())
+    a, b, c = mesh.vertices[mesh.faces[face]].transpose(1, 0, 2)
     root, along = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
-    return a + root * ((1 - along) * (b - a) + along * (c - a))
+    return a + root * ((1 - along) * (b - a) + along * (c - a)), face
+
+
+def face_normals(mesh: Mesh) -> np.ndarray:
+    """(f,3) unit normals; zero for triangles without area."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
 
 def border_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

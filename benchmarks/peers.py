@@ -1,12 +1,16 @@
-"""Named references, timed on the same points in the same process."""
+"""Other ways from points to a mesh, and the clock that times them and us."""
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.util import find_spec
 
 import numpy as np
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, KDTree
 
 from core import Mesh, MissingDependency
+
+_PCA_NEIGHBOURS, _ORIENTATION_NEIGHBOURS, _DEPTH = 30, 15, 8
 
 
 class Clock:
@@ -37,14 +41,10 @@ def poisson(points: np.ndarray) -> tuple[Mesh, np.ndarray, "Clock"]:
     Returns the mesh, the normals (n,3) and the time of the three steps. Raises :class:`MissingDependency`.
     """
     check_open3d()
-    import open3d
-
-    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
     with Clock() as clock:
-        cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(30))
-        cloud.orient_normals_consistent_tangent_plane(15)
-        mesh, _ = open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=8)
-    return Mesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles)), np.asarray(cloud.normals), clock
+        cloud = _oriented(points)
+        mesh, _ = _screened_poisson(cloud)
+    return _mesh(mesh), np.asarray(cloud.normals), clock
 
 
 def check_open3d() -> None:
@@ -52,3 +52,150 @@ def check_open3d() -> None:
     on to those it starts."""
     if find_spec("open3d") is None:
         raise MissingDependency("the peer needs Open3D, which is not installed; install open3d or leave --peer out")
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A way to a mesh.
+
+    title    : for tables     how : what is run, in a sentence
+    module   : the library it needs
+    prepare  : points (n,3) -> whatever all variants start from
+    finish   : (that, variant) -> Mesh
+    variants : values of its parameter to choose from; (None,) where it has none
+    unit     : what the parameter is
+    """
+
+    title: str
+    how: str
+    module: str
+    prepare: Callable
+    finish: Callable
+    variants: tuple = (None,)
+    unit: str = ""
+
+    @property
+    def available(self) -> bool:
+        return find_spec(self.module) is not None
+
+
+def _oriented(points):
+    import open3d
+
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(_PCA_NEIGHBOURS))
+    cloud.orient_normals_consistent_tangent_plane(_ORIENTATION_NEIGHBOURS)
+    return cloud
+
+
+def _screened_poisson(cloud):
+    import open3d
+
+    return open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=_DEPTH)
+
+
+def _trim(poisson, share):
+    import open3d
+
+    mesh, densities = poisson
+    trimmed = open3d.geometry.TriangleMesh(mesh)
+    trimmed.remove_vertices_by_mask(np.asarray(densities) < np.quantile(densities, share))
+    return _mesh(trimmed)
+
+
+def _roll_balls(prepared, radii):
+    import open3d
+
+    cloud, spacing = prepared
+    sizes = open3d.utility.DoubleVector(spacing * np.array(radii))
+    return _mesh(open3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, sizes))
+
+
+def _tetrahedra(points):
+    import open3d
+
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    return cloud, open3d.geometry.TetraMesh.create_from_point_cloud(cloud), _spacing(points)
+
+
+def _alpha_shape(prepared, multiple):
+    import open3d
+
+    cloud, (tetrahedra, rows), spacing = prepared
+    return _mesh(
+        open3d.geometry.TriangleMesh.create_from_point_cloud_alpha_shape(cloud, multiple * spacing, tetrahedra, rows)
+    )
+
+
+def _advancing_front(points, _):
+    from CGAL.CGAL_Advancing_front_surface_reconstruction import advancing_front_surface_reconstruction
+    from CGAL.CGAL_Kernel import Point_3
+    from CGAL.CGAL_Point_set_3 import Point_set_3
+
+    cloud, faces = Point_set_3(), []
+    cloud.reserve(len(points))
+    for x, y, z in points.tolist():
+        cloud.insert(Point_3(x, y, z))
+    advancing_front_surface_reconstruction(cloud, faces)
+    return Mesh(points, np.array(faces, np.int32).reshape(-1, 3))
+
+
+def _spacing(points):
+    """Mean distance to the nearest other point."""
+    return KDTree(points).query(points, 2)[0][:, 1].mean()
+
+
+def _mesh(mesh):
+    return Mesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
+
+
+_NORMALS = f"PCA normals ({_PCA_NEIGHBOURS} neighbours), oriented along tangent planes ({_ORIENTATION_NEIGHBOURS})"
+
+PEERS = {
+    "poisson": Peer(
+        "Poisson",
+        f"Open3D: {_NORMALS}, screened Poisson reconstruction at depth {_DEPTH}",
+        "open3d",
+        lambda points: _screened_poisson(_oriented(points)),
+        lambda poisson, _: _mesh(poisson[0]),
+    ),
+    "trimmed": Peer(
+        "Poisson, trimmed",
+        "the same, without the vertices of least density",
+        "open3d",
+        lambda points: _screened_poisson(_oriented(points)),
+        _trim,
+        (0.01, 0.03, 0.1, 0.2, 0.4),
+        "share of vertices dropped",
+    ),
+    "pivoting": Peer(
+        "ball pivoting",
+        f"Open3D: {_NORMALS}, ball pivoting",
+        "open3d",
+        lambda points: (_oriented(points), _spacing(points)),
+        _roll_balls,
+        ((2, 4), (1.5, 3, 6), (3, 6, 12)),
+        "radii in mean distances to the nearest point",
+    ),
+    "alpha": Peer(
+        "alpha shape",
+        "Open3D: alpha shape",
+        "open3d",
+        _tetrahedra,
+        _alpha_shape,
+        (3, 4, 6, 9, 12),
+        "alpha in mean distances to the nearest point",
+    ),
+    "front": Peer(
+        "advancing front",
+        "CGAL: advancing front surface reconstruction at its defaults",
+        "CGAL",
+        lambda points: points,
+        _advancing_front,
+    ),
+}
+
+
+def peer_libraries() -> list[str]:
+    """Modules of the peers that are installed."""
+    return sorted({peer.module for peer in PEERS.values() if peer.available})

@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from core.io.atomic import atomic_path
 
 INK, QUIET, ACCENT = "#1b2430", "#66707c", "#e4572e"
-_COLOURS = ["#17344f", "#3f7fa3", ACCENT, "#c9a227", "#6a8d55"]
-_STYLE = {
+COLOURS = ["#17344f", "#3f7fa3", ACCENT, "#c9a227", "#6a8d55"]
+STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
     "text.color": INK,
@@ -22,7 +22,7 @@ _STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "axes.prop_cycle": plt.cycler(color=_COLOURS),
+    "axes.prop_cycle": plt.cycler(color=COLOURS),
     "grid.color": "#e6e9ec",
     "legend.frameon": False,
 }
@@ -33,7 +33,7 @@ def plot_convergence(path: Path, curves: dict[str, dict], tolerance: float) -> N
 
     tolerance : degrees, mean turn at which the sweeps end
     """
-    with plt.rc_context(_STYLE):
+    with plt.rc_context(STYLE):
         figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
         for name, curve in curves.items():
             left.plot(curve["energy"])
@@ -51,11 +51,11 @@ def plot_convergence(path: Path, curves: dict[str, dict], tolerance: float) -> N
 def plot_growth(path: Path, measured: list[dict]) -> None:
     """CPU time of the stage and of Delaunay alone over the number of points, in units of Delaunay's at the fewest."""
     counts, unit = [run["points"] for run in measured], measured[0]["delaunay_cpu"]
-    with plt.rc_context(_STYLE):
+    with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(6.5, 4.2), layout="constrained")
         for key, label, colour in (
             ("stage_cpu", "facets and sweeps", ACCENT),
-            ("delaunay_cpu", "scipy.spatial.Delaunay alone", _COLOURS[1]),
+            ("delaunay_cpu", "scipy.spatial.Delaunay alone", COLOURS[1]),
         ):
             axes.plot(counts, [run[key] / unit for run in measured], color=colour, marker="o", label=label)
         straight = measured[0]["stage_cpu"] / unit

@@ -92,17 +92,9 @@ COST = [
     Column("field", "share.field", "{:.0%}", None),
     Column("surface", "share.surface", "{:.0%}", None),
     Column("peak MB", "peak_memory_mb", "{:.0f}", tolerance=0.05),
-    Column("total / Poisson", "peer.total_to_poisson", "{:.2f}", None),
-    Column("same, CPU time", "peer.cpu_to_poisson", "{:.2f}", tolerance=0.3),
-    Column("normals / Delaunay", "peer.normals_to_delaunay", "{:.1f}", None),
-]
-PEER = [
-    Column("CD: Poisson", "peer.cd", goal=None),
-    Column("ours", "mesh.cd", goal=None),
-    Column("HD: Poisson", "peer.hd", "{:.1f}", None),
-    Column("ours", "mesh.hd", "{:.1f}", None),
-    Column("NC: PCA", "peer.nc", "{:.4f}", None),
-    Column("ours", "normals.nc", "{:.4f}", None),
+    Column("total / Poisson", "ratio.total_to_poisson", "{:.2f}", None),
+    Column("same, CPU time", "ratio.cpu_to_poisson", "{:.2f}", tolerance=0.3),
+    Column("normals / Delaunay", "ratio.normals_to_delaunay", "{:.1f}", None),
 ]
 TABLES = {
     "Double cover": SURFACE,
@@ -112,7 +104,6 @@ TABLES = {
     "Field": FIELD,
     "Integration": INTEGRATION,
     "Cost": COST,
-    "Against the peer": PEER,
 }
 _TERMINAL = [
     Column("CD", "mesh.cd"),
@@ -128,8 +119,8 @@ _TERMINAL = [
     Column("u/d 8", "rims.8.mean", "{:.2f}"),
     Column("seconds", "seconds.total", "{:.1f}"),
     Column("MB", "peak_memory_mb", "{:.0f}"),
-    Column("peer CD", "peer.cd"),
-    Column("t/peer", "peer.total_to_poisson", "{:.2f}"),
+    Column("best peer", "best_peer.cd"),
+    Column("t/peer", "ratio.total_to_poisson", "{:.2f}"),
 ]
 
 

@@ -1,34 +1,60 @@
 """One case in, one dict of numbers out; many cases, each in a process of its own."""
 
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 
 from core import Settings, reconstruct
+from core.memory import peak_memory_mb
 
 from . import peers
-from .cases import Case, load_case
+from .against import best_peer
+from .cases import load_case
 from .field_metrics import field_errors, past_rims
+from .measure_peer import measure_peer
 from .metrics import cover_euler, normal_agreement, surface_errors, topology, triangle_quality
+from .processes import Failed, run_fresh, run_warm
+
+PEER_LIMIT = 600.0  # seconds, all variants together
 
 
-def run_cases(paths: list[Path], sampling: str, settings: Settings, with_peers: bool) -> Iterator[dict]:
-    """Results case by case. Each runs in a fresh process, so that its peak memory is its own; one that fails yields
-    its name and the error."""
+def run_cases(
+    paths: list[Path], sampling: str, settings: Settings, with_peers: bool, repeats: int = 1
+) -> Iterator[dict]:
+    """Results case by case. We and each peer run in a process of our own; one that fails yields its name and the
+    error."""
     for path in paths:
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-            future = pool.submit(run_case, path, sampling, settings, with_peers)
-            error = future.exception()
-            yield {"case": path.stem, "error": f"{type(error).__name__}: {error}"} if error else future.result()
+        try:
+            result = run_fresh(run_case, path, sampling, settings, repeats)
+        except Failed as error:
+            yield {"case": path.stem, "error": str(error)}
+            continue
+        if with_peers:
+            result["peers"] = run_peers(path, sampling, repeats)
+            result["ratio"] = _ratios(result)
+            if best := best_peer(result):
+                result["best_peer"] = {"name": best, "cd": result["peers"][best]["cd"]}
+        yield result
 
 
-def run_case(path: Path, sampling: str, settings: Settings, with_peers: bool) -> dict:
+def run_peers(path: Path, sampling: str, repeats: int = 1) -> dict[str, dict]:
+    """:func:`measure_peer` of all that are installed, by name; one that fails has only the key `error`."""
+    measured = {}
+    for name, peer in peers.PEERS.items():
+        if peer.available:
+            try:
+                measured[name] = run_warm(measure_peer, name, path, sampling, repeats, limit=PEER_LIMIT)
+            except Failed as error:
+                measured[name] = {"error": str(error)}
+    return measured
+
+
+def run_case(path: Path, sampling: str, settings: Settings, repeats: int = 1) -> dict:
     """Reconstruct one case and measure it against its truth; lengths in the case's own scale, nested by subject."""
     case = load_case(path, sampling)
-    with peers.Clock() as clock:
-        result = reconstruct(case.points, settings)
+    before = peak_memory_mb()
+    result, clock = _reconstruct(case, settings)
+    clock, stages = _median([(clock, result), *(_reconstruct(case, settings)[::-1] for _ in range(repeats - 1))])
     rows = result.source_index
     measured = {
         "case": case.name,
@@ -38,25 +64,39 @@ def run_case(path: Path, sampling: str, settings: Settings, with_peers: bool) ->
         "normals": normal_agreement(result.normals, case.normals[rows], case.points[rows], case.nm_curve),
         "field": field_errors(result.field, case.truth, result.points),
         "rims": past_rims(result.field, case.truth),
-        "seconds": {**result.report["seconds"], "total": clock.seconds, "cpu": clock.cpu},
+        "seconds": {**stages, "total": clock.seconds, "cpu": clock.cpu},
         "peak_memory_mb": result.report["peak_memory_mb"],
+        "memory_mb": result.report["peak_memory_mb"] - before,
+        "delaunay_seconds": peers.delaunay_seconds(case.points),
         "warnings": result.report["warnings"],
     }
     if result.surface is not None:
         measured["mesh"] = _measure_mesh(result.surface, case)
-    sheet = reconstruct(case.points, replace(settings, surface="single")).sheet
+    single, clock = _reconstruct(case, replace(settings, surface="single"))
     measured["sheet"] = {
-        **surface_errors(sheet, case.truth),
-        **topology(sheet),
-        "loops": sheet.border_loops(),
+        **surface_errors(single.sheet, case.truth),
+        **topology(single.sheet),
+        "loops": single.sheet.border_loops(),
         "euler_expected": topology(case.truth)["euler"],
         "loops_expected": case.truth.border_loops(),
+        "seconds": clock.seconds,
     }
     poisson = reconstruct(case.points, replace(settings, surface="none", integration="poisson")).field
     measured["poisson"] = field_errors(poisson, case.truth, result.points)
-    if with_peers:
-        measured["peer"] = _measure_peers(case, measured["seconds"])
     return measured
+
+
+def _reconstruct(case, settings):
+    with peers.Clock() as clock:
+        result = reconstruct(case.points, settings)
+    return result, clock
+
+
+def _median(runs):
+    """Clock and seconds per stage of the run of median time, the lower of two."""
+    runs = sorted(runs, key=lambda run: run[0].seconds)
+    clock, result = runs[(len(runs) - 1) // 2]
+    return clock, result.report["seconds"]
 
 
 def _measure_mesh(mesh, case):
@@ -67,17 +107,11 @@ def _measure_mesh(mesh, case):
     return found
 
 
-def _measure_peers(case: Case, seconds: dict) -> dict:
-    """Errors and seconds of the peers, and how our seconds compare: below 1 is faster than the peer."""
-    delaunay = peers.delaunay_seconds(case.points)
-    mesh, normals, poisson = peers.poisson(case.points)
-    return {
-        **surface_errors(mesh, case.truth),
-        "nc": normal_agreement(normals, case.normals, case.points, case.nm_curve)["nc"],
-        "poisson_seconds": poisson.seconds,
-        "poisson_cpu": poisson.cpu,
-        "delaunay_seconds": delaunay,
-        "total_to_poisson": seconds["total"] / poisson.seconds,
-        "cpu_to_poisson": seconds["cpu"] / poisson.cpu,
-        "normals_to_delaunay": seconds["normals"] / delaunay,
-    }
+def _ratios(result):
+    """How our times compare: below 1 is faster than the other."""
+    seconds, poisson = result["seconds"], result["peers"].get("poisson", {})
+    ratios = {"normals_to_delaunay": seconds["normals"] / result["delaunay_seconds"]}
+    if "seconds" in poisson:
+        ratios["total_to_poisson"] = seconds["total"] / poisson["seconds"]
+        ratios["cpu_to_poisson"] = seconds["cpu"] / poisson["cpu"]
+    return ratios

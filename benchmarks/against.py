@@ -1,0 +1,128 @@
+"""Us against the peers, case by case, and what that adds up to."""
+
+from collections.abc import Iterator
+
+from .cases import SPOILED
+from .peers import PEERS
+from .report import ABSENT
+
+WORSE_BY = 1.3  # of the best peer's CD, at most
+SHARE = 0.85  # of the clean cases, at least, with the lowest CD
+OURS = {"double": "VAD, double cover", "single": "VAD, single layer"}
+_DEFAULT = "double"
+
+
+def contenders(result: dict) -> dict[str, dict]:
+    """Measures of both our surfaces and of every peer on a case, by name; those of a failed peer are only `error`."""
+    both = {"memory_mb": result["memory_mb"], "variant": None}
+    ours = {
+        "double": result["mesh"] | both | {"seconds": result["seconds"]["total"]},
+        "single": result["sheet"] | both,
+    }
+    return ours | result["peers"]
+
+
+def best_peer(result: dict) -> str | None:
+    """Name of the peer with the lowest CD; None where none succeeded."""
+    made = {name: found["cd"] for name, found in result["peers"].items() if "cd" in found}
+    return min(made, key=made.get) if made else None
+
+
+def compared(results: list[dict]) -> list[dict]:
+    """The results that can be compared: of cases that worked for us and at least one peer."""
+    return [result for result in results if "error" not in result and "peers" in result and best_peer(result)]
+
+
+def verdicts(results: list[dict]) -> Iterator[str]:
+    """What the comparison adds up to over the clean cases, for either surface, and where we lose."""
+    clean = [result for result in compared(results) if result["category"] not in SPOILED]
+    if not clean:
+        return
+    for name, title in OURS.items():
+        ratios = {result["case"]: _ratio(result, name) for result in clean}
+        won = sum(ratio <= 1 for ratio in ratios.values())
+        worst = max(ratios, key=ratios.get)
+        word = ""
+        if name == _DEFAULT:
+            word = "**Met**: " if won >= SHARE * len(clean) and ratios[worst] <= WORSE_BY else "**Missed**: "
+        yield (
+            f"{word}{title}: the lowest CD on {won} of {len(clean)} clean cases ({won / len(clean):.0%}; {SHARE:.0%} "
+            f"is asked); at worst {ratios[worst]:.2f} × the best peer's, on {worst} (at most {WORSE_BY} is asked)."
+        )
+    for result in compared(results):
+        ratio = _ratio(result, _DEFAULT)
+        if ratio > 1:
+            kind = "" if result["category"] not in SPOILED else f", {result['category']}"
+            yield (
+                f"Lost: {result['case']}{kind}: CD {result['mesh']['cd']:.3f}, single layer "
+                f"{result['sheet']['cd']:.3f}, {PEERS[best_peer(result)].title} "
+                f"{result['peers'][best_peer(result)]['cd']:.3f}."
+            )
+
+
+def _ratio(result, ours):
+    return contenders(result)[ours]["cd"] / result["peers"][best_peer(result)]["cd"]
+
+
+def peer_tables(results: list[dict], level: int = 2) -> str:
+    """Verdicts and both tables under a heading of the level; empty where there is nothing to compare."""
+    if not compared(results):
+        return ""
+    said = "\n".join(f"- {line}" for line in verdicts(results))
+    parts = [f"{'#' * level} Against the peers", said, overview(results), full_table(results)]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def overview(results: list[dict]) -> str:
+    """CD of every way on every case, the lowest in bold, as a Markdown table."""
+    titles = _titles(results)
+    lines = [["case", *titles.values(), "double cover / best peer"], ["---", *("---:" for _ in titles), "---:"]]
+    for result in compared(results):
+        found = contenders(result)
+        lowest = min(measures["cd"] for measures in found.values() if "cd" in measures)
+        cells = [_cd(found.get(name, {}), lowest) for name in titles]
+        lines.append([result["case"], *cells, f"{_ratio(result, _DEFAULT):.2f}"])
+    return _markdown(lines)
+
+
+def _cd(measures, lowest):
+    if "cd" not in measures:
+        return "failed" if "error" in measures else ABSENT
+    return f"**{measures['cd']:.3f}**" if measures["cd"] == lowest else f"{measures['cd']:.3f}"
+
+
+def full_table(results: list[dict]) -> str:
+    """CD, HD, NC of the surface, seconds and memory of every way on every case, as a Markdown table."""
+    titles = _titles(results)
+    lines = [["case", "way", "variant", "CD", "HD", "NC", "seconds", "MB"], ["---"] * 3 + ["---:"] * 5]
+    for result in compared(results):
+        for name, found in contenders(result).items():
+            if "error" in found:
+                lines.append([result["case"], titles[name], found["error"], *[ABSENT] * 5])
+                continue
+            variant = ABSENT if found["variant"] is None else str(found["variant"]).strip("()[]")
+            numbers = f"{found['cd']:.3f} {found['hd']:.1f} {found['nc']:.4f} {found['seconds']:.2f}".split()
+            lines.append([result["case"], titles[name], variant, *numbers, f"{found['memory_mb']:.0f}"])
+    return _markdown(lines)
+
+
+def ways() -> str:
+    """What each peer is, as a Markdown list; those that are not installed are said to be left out."""
+    lines = []
+    for peer in PEERS.values():
+        choice = f"; {peer.unit}: the best of {_listed(peer.variants)}" if peer.unit else ""
+        lines.append(f"- *{peer.title}*: {peer.how}{choice}{'' if peer.available else ' (not installed, left out)'}.")
+    return "\n".join(lines)
+
+
+def _listed(variants):
+    return "; ".join(" and ".join(map(str, v)) if isinstance(v, tuple) else str(v) for v in variants)
+
+
+def _titles(results):
+    run = {name for result in compared(results) for name in result["peers"]}
+    return OURS | {name: peer.title for name, peer in PEERS.items() if name in run}
+
+
+def _markdown(lines):
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,51 @@
+"""What docs/field.md says is met and what is not, from its numbers."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .cases import SPOILED
+from .field_metrics import RIM_STEPS
+from .field_tables import WAYS
+
+BOX, NEAR, RIM = 1.2, 0.45, 0.1
+BASELINES = "nearest", "planes", "blended", "open3d"
+
+
+def verdicts(numbers: dict) -> Iterator[str]:
+    """A line for each aim: what is asked, what came out."""
+    for sampling, results in numbers["quality"].items():
+        clean = [result for result in results if result["category"] not in SPOILED]
+        for where, most in (("box", BOX), ("near", NEAR)):
+            mean = float(np.mean([result["ours"][where] for result in clean]))
+            place = "in the box" if where == "box" else "near the surface"
+            yield (
+                f"{_word(mean <= most)}, {sampling}: mean |u − d| {place} is {mean:.2f} on average over the "
+                f"{len(clean)} clean cases (at most {most:g} is asked)."
+            )
+        for way in BASELINES:
+            ahead = [_pair(result, way) for result in clean if result[way]["near"] <= result["ours"]["near"]]
+            yield (
+                f"{_word(not ahead)}, {sampling}: near the surface, *{WAYS[way]}* is as close as ours or closer on "
+                f"{'; '.join(ahead) or 'no clean case'} (none is asked)."
+            )
+        for way in ("projection", "poisson"):
+            ahead = [_pair(result, way) for result in clean if result[way]["near"] <= result["ours"]["near"]]
+            yield f"{sampling}: near the surface, *{WAYS[way]}* is closer than ours on {'; '.join(ahead) or 'no case'}."
+    for row in numbers["rims"]:
+        if row["sampling"] == "as sampled":
+            found = [row["ways"]["kept"][str(cells)] for cells in RIM_STEPS]
+            worst = max(abs(one["mean"] - 1) for one in found)
+            off = ", ".join(f"{one['off']:.3f}" for one in found)
+            yield (
+                f"{_word(worst <= RIM)}: past the rim of {row['case']}, u is within {worst:.1%} of d on average at 4, "
+                f"8 and 16 cells (at most {RIM:.0%} is asked); point by point it is off by {off} of d on average."
+            )
+
+
+def _pair(result, way):
+    return f"{result['case']} ({result[way]['near']:.2f}, ours {result['ours']['near']:.2f})"
+
+
+def _word(met):
+    return "**Met**" if met else "**Missed**"

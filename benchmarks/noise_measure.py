@@ -1,0 +1,138 @@
+"""Noise and stray points on clean cases: what each way to a surface makes of them."""
+
+from importlib.util import find_spec
+
+import numpy as np
+
+from core import Mesh, Settings, reconstruct
+from core.cleaning.offsets import alternate
+from core.normals.pca import pca_normals
+
+from .cases import Case
+from .geometry import closest_points
+from .metrics import surface_errors, topology
+from .peers import PEERS, Clock, poisson
+
+NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
+STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
+PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
+JET_NEIGHBOURS = 24
+MARGIN = 1.1  # strays fill the box of the object, this much enlarged
+
+
+def noisy(case: Case, percent: float, seed: int = 0) -> np.ndarray:
+    """Points (n,3) of the case with Gaussian noise in every coordinate; its deviation is in per cent of their longest
+    side."""
+    deviation = 0.01 * percent * np.ptp(case.points, axis=0).max()
+    return case.points + np.random.default_rng(seed).normal(size=case.points.shape) * deviation
+
+
+def strewn(case: Case, share: float, seed: int = 0) -> np.ndarray:
+    """Points (m,3), m >= n, of the case followed by `share` times as many uniform in its box."""
+    low, high = case.points.min(axis=0), case.points.max(axis=0)
+    count = int(share * len(case.points))
+    spread = np.random.default_rng(seed).uniform(-0.5, 0.5, (count, 3)) * MARGIN * (high - low)
+    return np.vstack([case.points, (low + high) / 2 + spread])
+
+
+def measure_noise(case: Case, percent: float) -> dict:
+    """Distances of the points to the true surface, x1e3, agreement of normals, errors of the surfaces and CPU seconds,
+    by way to get there; see `docs/noise.md`."""
+    points = noisy(case, percent)
+    ways = {"ours": _ours, "alternating": _alternating, "poisson": _poisson, "jet": _jet}
+    if find_spec("CGAL") is None:
+        del ways["jet"]
+    found = {name: way(case, points) for name, way in ways.items()}
+    agreement = {k: _agreement(pca_normals(points, k)[0], case.normals) for k in PCA_NEIGHBOURS}
+    best = max(agreement, key=agreement.get)
+    return {
+        "case": case.name,
+        "points": len(points),
+        "percent": percent,
+        "deviation": 10 * percent * np.ptp(case.points, axis=0).max(),
+        "before": _distance(points, case.truth),
+        "pca": {"nc": agreement[best], "k": best},
+        **found,
+    }
+
+
+def measure_strays(case: Case, share: float) -> dict:
+    """Errors of the surface with strays looked for and, for the CD, not; shares of the strays found and of the case's
+    own points lost with them; pieces of the surface, and the share of its faces in the largest."""
+    points = strewn(case, share)
+    result = reconstruct(points)
+    kept = np.zeros(len(points), bool)
+    kept[result.source_index] = True
+    own = np.arange(len(points)) < len(case.points)
+    untreated = reconstruct(points, Settings(outliers=False)) if share else result
+    return {
+        "case": case.name,
+        "share": share,
+        "found": 1.0 - kept[~own].mean() if share else None,
+        "lost": 1.0 - kept[own].mean(),
+        **{name: surface_errors(result.surface, case.truth)[name] for name in ("cd", "hd")},
+        "untreated_cd": surface_errors(untreated.surface, case.truth)["cd"],
+        "pieces": topology(result.surface)["components"],
+    }
+
+
+def _ours(case, points):
+    with Clock() as clock:
+        result = reconstruct(points)
+    cleaning = result.report["cleaning"]
+    return {
+        "after": _distance(result.points, case.truth),
+        "nc": _agreement(result.normals, case.normals[result.source_index]),
+        "noise": 1e3 * cleaning.get("noise", 0.0),
+        "neighbours": cleaning.get("neighbours"),
+        "cpu": clock.cpu,
+        **_errors(result.surface, case),
+    }
+
+
+def _alternating(case, points):
+    """The paper's positions and normals by turns, then the rest of the method with both as they are."""
+    with Clock() as clock:
+        moved, axes, changes = alternate(points)
+        result = reconstruct(moved, Settings(denoise=0, outliers=False), (np.arange(len(moved)), axes))
+    return {
+        "after": _distance(moved, case.truth),
+        "nc": _agreement(axes, case.normals),
+        "changes": changes,
+        "cpu": clock.cpu,
+        **_errors(result.surface, case),
+    }
+
+
+def _poisson(case, points):
+    mesh, axes, clock = poisson(points)
+    return {"nc": _agreement(axes, case.normals), "cpu": clock.cpu, **_errors(mesh, case)}
+
+
+def _jet(case, points):
+    """CGAL's jet smoothing, then its advancing front."""
+    from CGAL.CGAL_Kernel import Point_3
+    from CGAL.CGAL_Point_set_3 import Point_set_3
+    from CGAL.CGAL_Point_set_processing_3 import jet_smooth_point_set
+
+    with Clock() as clock:
+        cloud = Point_set_3()
+        for x, y, z in points.tolist():
+            cloud.insert(Point_3(x, y, z))
+        jet_smooth_point_set(cloud, JET_NEIGHBOURS)
+        moved = np.array([[point.x(), point.y(), point.z()] for point in cloud.points()])
+        mesh = PEERS["front"].finish(moved, None)
+    return {"after": _distance(moved, case.truth), "cpu": clock.cpu, **_errors(mesh, case)}
+
+
+def _errors(mesh: Mesh, case: Case) -> dict:
+    errors = surface_errors(mesh, case.truth)
+    return {"cd": errors["cd"], "hd": errors["hd"]}
+
+
+def _distance(points, truth):
+    return 1e3 * closest_points(points, truth)[0].mean()
+
+
+def _agreement(axes, true_normals):
+    return np.abs(np.einsum("ni,ni->n", axes, true_normals)).mean()

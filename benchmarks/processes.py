@@ -1,0 +1,53 @@
+"""Work in processes of its own: its memory is its own, and what crashes or takes too long there ends there."""
+
+import sys
+from collections.abc import Callable
+from multiprocessing import get_context
+
+_WARM = "forkserver" if sys.platform != "win32" else "spawn"
+_LOADED_ONCE = ["open3d", "benchmarks.measure_peer"]
+
+
+class Failed(Exception):
+    """What went wrong in the other process, in one line."""
+
+
+def run_fresh(function: Callable, *arguments):
+    """function(*arguments) in a new Python that has loaded nothing yet. Raises :class:`Failed`."""
+    return _run(get_context("spawn"), function, arguments, None)
+
+
+def run_warm(function: Callable, *arguments, limit: float):
+    """The same in a copy of a Python that has loaded the peers' libraries and no more, within `limit` seconds."""
+    context = get_context(_WARM)
+    if _WARM == "forkserver":
+        context.set_forkserver_preload(_LOADED_ONCE)
+    return _run(context, function, arguments, limit)
+
+
+def _run(context, function, arguments, limit):
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_report, args=(sender, function, arguments), daemon=True)
+    process.start()
+    sender.close()
+    try:
+        if not receiver.poll(limit):
+            raise Failed(f"not done after {limit:.0f} s")
+        worked, result = receiver.recv()
+    except EOFError:
+        process.join()
+        raise Failed(f"crashed with exit code {process.exitcode}") from None
+    finally:
+        process.kill()
+        process.join()
+        receiver.close()
+    if not worked:
+        raise Failed(result)
+    return result
+
+
+def _report(sender, function, arguments):
+    try:
+        sender.send((True, function(*arguments)))
+    except Exception as error:  # noqa: BLE001 - whatever it is, the caller is to hear of it
+        sender.send((False, f"{type(error).__name__}: {error}"))

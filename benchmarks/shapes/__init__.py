@@ -1,0 +1,1 @@
+"""Surfaces in closed form, for cases that need no data from elsewhere."""

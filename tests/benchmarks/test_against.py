@@ -1,0 +1,96 @@
+"""What a comparison adds up to, on made-up results; and each peer that is installed, on a sphere."""
+
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.against import best_peer, full_table, overview, peer_tables, verdicts
+from benchmarks.measure_peer import measure_peer
+from benchmarks.peers import PEERS
+from benchmarks.run import run_peers
+
+
+def measures(cd, **more):
+    return {"cd": cd, "hd": 10 * cd, "nc": 0.9, "seconds": 1.0, "memory_mb": 5.0, "variant": None, **more}
+
+
+def result(case, double, single, category="open", **peers):
+    return {
+        "case": case,
+        "category": category,
+        "mesh": measures(double),
+        "sheet": measures(single),
+        "seconds": {"total": 2.0},
+        "memory_mb": 7.0,
+        "peers": {name: measures(cd) if isinstance(cd, float) else {"error": cd} for name, cd in peers.items()},
+    }
+
+
+def test_verdicts_follow_the_numbers():
+    good = [result(f"c{k}", 1.0, 1.0, poisson=2.0, front=3.0) for k in range(9)]
+    lines = list(verdicts([*good, result("edge", 1.2, 0.9, poisson=1.0)]))
+    assert lines[0].startswith("**Met**: VAD, double cover: the lowest CD on 9 of 10 clean cases (90%;")
+    assert "at worst 1.20 × the best peer's, on edge" in lines[0]
+    assert lines[1].startswith("VAD, single layer: the lowest CD on 10 of 10")
+    assert lines[2:] == ["Lost: edge: CD 1.200, single layer 0.900, Poisson 1.000."]
+    assert next(verdicts([*good, result("bad", 1.4, 1.4, poisson=1.0)])).startswith("**Missed**")
+    assert next(verdicts([good[0], result("few", 1.1, 1.1, poisson=1.0)])).startswith("**Missed**")
+
+
+def test_spoiled_cases_count_for_nothing_but_are_shown():
+    lines = list(verdicts([result("a", 1.0, 1.0, poisson=2.0), result("n", 3.0, 2.0, "noisy", alpha=1.0)]))
+    assert "1 of 1 clean cases" in lines[0]
+    assert lines[2] == "Lost: n, noisy: CD 3.000, single layer 2.000, alpha shape 1.000."
+
+
+def test_tables_show_the_lowest_and_what_failed():
+    results = [result("a", 1.0, 1.5, poisson=2.0, front="crashed"), {"case": "b", "error": "MemoryError"}]
+    assert best_peer(results[0]) == "poisson"
+    lines = overview(results).splitlines()
+    assert lines[0].split(" | ")[1:3] == ["VAD, double cover", "VAD, single layer"]
+    assert lines[2] == "| a | **1.000** | 1.500 | 2.000 | failed | 0.50 |"
+    rows = full_table(results).splitlines()[2:]
+    assert rows[0] == "| a | VAD, double cover | – | 1.000 | 10.0 | 0.9000 | 2.00 | 7 |"
+    assert rows[3] == "| a | advancing front | crashed | – | – | – | – | – |"
+    assert len({line.count("|") for line in rows}) == 1
+    assert peer_tables([{"case": "b", "error": "MemoryError"}]) == ""
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    """800 points spread evenly on a sphere of radius .4, and a fine mesh of it."""
+    from benchmarks.shapes.surface import from_implicit
+
+    mesh = from_implicit(lambda x: (x**2).sum(axis=1) - 1, 1.2, 40).mesh
+    height = 1 - (2 * np.arange(800) + 1) / 800
+    turn = np.pi * (3 - np.sqrt(5)) * np.arange(800)
+    around = np.sqrt(1 - height**2)
+    normals = np.stack([around * np.cos(turn), around * np.sin(turn), height], axis=1)
+    path = tmp_path_factory.mktemp("cases") / "ball.npz"
+    meta = json.dumps({"category": "watertight", "license": "CC0", "origin": "here"})
+    np.savez(
+        path,
+        points=0.4 * normals,
+        normals=normals,
+        gt_v=mesh.vertices,
+        gt_f=mesh.faces,
+        nm_curve=np.empty((0, 3)),
+        meta=meta,
+    )
+    return path
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_a_peer_meshes_a_sphere(name, ball):
+    pytest.importorskip(PEERS[name].module)
+    found = measure_peer(name, ball, "uniform", 1)
+    assert found["cd"] < 5
+    assert found["nc"] > 0.95
+    assert found["seconds"] > 0
+    assert found["variant"] in PEERS[name].variants
+
+
+def test_peers_that_are_not_installed_are_left_out(ball, monkeypatch):
+    monkeypatch.setattr("benchmarks.peers.find_spec", lambda module: None)
+    assert run_peers(ball, "uniform") == {}
