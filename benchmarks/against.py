@@ -10,13 +10,21 @@ WORSE_BY = 1.3  # of the best peer's CD, at most
 SHARE = 0.85  # of the clean cases, at least, with the lowest CD
 OURS = {"double": "VAD, double cover", "single": "VAD, single layer"}
 _DEFAULT = "double"
+_COLUMNS = {
+    "cd": "{:.3f}",
+    "hd": "{:.1f}",
+    "nc": "{:.4f}",
+    "seconds": "{:.2f}",
+    "cpu": "{:.2f}",
+    "memory_mb": "{:.0f}",
+}
 
 
 def contenders(result: dict) -> dict[str, dict]:
     """Measures of both our surfaces and of every peer on a case, by name; those of a failed peer are only `error`."""
     both = {"memory_mb": result["memory_mb"], "variant": None}
     ours = {
-        "double": result["mesh"] | both | {"seconds": result["seconds"]["total"]},
+        "double": result["mesh"] | both | {"seconds": result["seconds"]["total"], "cpu": result["seconds"]["cpu"]},
         "single": result["sheet"] | both,
     }
     return ours | result["peers"]
@@ -92,17 +100,17 @@ def _cd(measures, lowest):
 
 
 def full_table(results: list[dict]) -> str:
-    """CD, HD, NC of the surface, seconds and memory of every way on every case, as a Markdown table."""
+    """CD, HD, NC of the surface, time and memory of every way on every case, as a Markdown table."""
     titles = _titles(results)
-    lines = [["case", "way", "variant", "CD", "HD", "NC", "seconds", "MB"], ["---"] * 3 + ["---:"] * 5]
+    lines = [["case", "way", "variant", "CD", "HD", "NC", "seconds", "CPU", "MB"], ["---"] * 3 + ["---:"] * 6]
     for result in compared(results):
         for name, found in contenders(result).items():
             if "error" in found:
-                lines.append([result["case"], titles[name], found["error"], *[ABSENT] * 5])
+                lines.append([result["case"], titles[name], found["error"], *[ABSENT] * 6])
                 continue
             variant = ABSENT if found["variant"] is None else str(found["variant"]).strip("()[]")
-            numbers = f"{found['cd']:.3f} {found['hd']:.1f} {found['nc']:.4f} {found['seconds']:.2f}".split()
-            lines.append([result["case"], titles[name], variant, *numbers, f"{found['memory_mb']:.0f}"])
+            numbers = [form.format(found[key]) for key, form in _COLUMNS.items()]
+            lines.append([result["case"], titles[name], variant, *numbers])
     return _markdown(lines)
 
 

@@ -20,6 +20,7 @@ from .plots import ACCENT, COLOURS, INK, QUIET, STYLE
 STEP = 0.02  # between iso-lines
 _VIEW = 0.75  # of the cut's direction towards the viewer; the rest is from above
 _IMAGE = 520, 560
+_WAYS = ACCENT, "#c9a227", "#17344f", "#3f7fa3", "#6a8d55"
 _DPI = 80
 _COLOURS_KEPT = 64
 
@@ -77,17 +78,17 @@ def plot_density_cuts(path: Path, found: dict, nodes: np.ndarray, axis: int, up:
 
 
 def plot_densities(path: Path, rows: list[dict], titles: dict[str, str]) -> None:
-    """Error near the surface over the number of points, for each shape."""
+    """Error at nodes near the surface over the number of points, for each shape."""
     shapes = list(dict.fromkeys(row["case"] for row in rows))
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, len(shapes), figsize=(10, 4), layout="constrained", sharey=True)
         for panel, shape in zip(axes, shapes, strict=True):
             of_shape = [row for row in rows if row["case"] == shape]
-            for colour, (way, title) in zip((ACCENT, *COLOURS), titles.items(), strict=False):
-                errors = [row[way]["near"] for row in of_shape]
+            for colour, (way, title) in zip(_WAYS, titles.items(), strict=True):
+                errors = [row[way]["nodes"] for row in of_shape]
                 panel.plot([row["points"] for row in of_shape], errors, marker="o", label=title, color=colour)
             panel.set(xscale="log", yscale="log", xlabel="points", title=shape)
-        axes[0].set_ylabel("mean |u − d| × 1000 within .05")
+        axes[0].set_ylabel("mean |u − d| × 1000 at nodes")
         axes[-1].legend()
         _save(figure, path)
 

@@ -21,21 +21,24 @@ DENSITY_WAYS = {
     "projection": "no diffusion",
     "nearest": "nearest sample",
     "planes": "PCA planes",
+    "exact": "exact nodes",
 }
 BORDERS = {"none": "none", "discs": "discs", "bracket": "bracket", "kept": "rims", "poisson": "Poisson"}
 
 
 def quality(results: list[dict], where: str) -> str:
-    """One row a case, `where` being "near" or "box"."""
-    return markdown_table(results, [Column(title, f"{way}.{where}") for way, title in WAYS.items()])
+    """One row a case, `where` being "near", "nodes" or "box"."""
+    shown = [way for way in WAYS if way != "exact" or where != "nodes"]
+    return markdown_table(results, [Column(WAYS[way], f"{way}.{where}") for way in shown])
 
 
 def densities(rows: list[dict]) -> str:
     lines = []
     for row in rows:
         found = [row[way] for way in DENSITY_WAYS]
-        lines.append([row["case"], f"{row['points']:,}", *(f"{one['near']:.2f} / {one['box']:.2f}" for one in found)])
-    return "Near / box:\n\n" + _table(["shape", "points", *DENSITY_WAYS.values()], lines)
+        errors = [" / ".join(f"{one[where]:.2f}" for where in ("near", "nodes", "box")) for one in found]
+        lines.append([row["case"], f"{row['points']:,}", *errors])
+    return "Near / at nodes / in the box:\n\n" + _table(["shape", "points", *DENSITY_WAYS.values()], lines)
 
 
 def offsets(shapes: list[dict]) -> str:

@@ -24,14 +24,17 @@ def verdicts(numbers: dict) -> Iterator[str]:
                 f"{len(clean)} clean cases (at most {most:g} is asked)."
             )
         for way in BASELINES:
-            ahead = [_pair(result, way) for result in clean if result[way]["near"] <= result["ours"]["near"]]
+            read, nodes = _ahead(clean, way, "near"), _ahead(clean, way, "nodes")
             yield (
-                f"{_word(not ahead)}, {sampling}: near the surface, *{WAYS[way]}* is as close as ours or closer on "
-                f"{'; '.join(ahead) or 'no clean case'} (none is asked)."
+                f"{_word(not read)}, {sampling}: near the surface, *{WAYS[way]}* is as close as ours or closer on "
+                f"{read or 'no clean case'} (none is asked); at the nodes on {nodes or 'none'}."
             )
         for way in ("projection", "poisson"):
-            ahead = [_pair(result, way) for result in clean if result[way]["near"] <= result["ours"]["near"]]
-            yield f"{sampling}: near the surface, *{WAYS[way]}* is closer than ours on {'; '.join(ahead) or 'no case'}."
+            read, nodes = _ahead(clean, way, "near"), _ahead(clean, way, "nodes")
+            yield (
+                f"{sampling}: near the surface, *{WAYS[way]}* is as close as ours or closer on "
+                f"{read or 'no clean case'}; at the nodes on {nodes or 'none'}."
+            )
     for row in numbers["rims"]:
         if row["sampling"] == "as sampled":
             found = [row["ways"]["kept"][str(cells)] for cells in RIM_STEPS]
@@ -43,8 +46,10 @@ def verdicts(numbers: dict) -> Iterator[str]:
             )
 
 
-def _pair(result, way):
-    return f"{result['case']} ({result[way]['near']:.2f}, ours {result['ours']['near']:.2f})"
+def _ahead(results, way, where):
+    """The cases where `way` errs no more than ours, with both errors, as text."""
+    ahead = [result for result in results if result[way][where] <= result["ours"][where]]
+    return "; ".join(f"{r['case']} ({r[way][where]:.2f}, ours {r['ours'][where]:.2f})" for r in ahead)
 
 
 def _word(met):

@@ -16,7 +16,6 @@ from core.normals.pca import pca_normals
 from .pictures import View, caption, draw_errors, draw_points, draw_surface, error_scale, save, sheet
 from .sampling import blue_noise, pierced, uniform, wires
 from .shapes import closed, junctions, one_sided, open
-from .shapes.surface import Surface
 from .status import DONE, exit_status
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "gallery"
@@ -61,13 +60,13 @@ def normals(path: Path) -> Path:
         result = reconstruct(points, Settings(surface="none", outliers=False))
         ways = {
             "sweeps": result.normals,
-            f"plane fit, {_PCA_NEIGHBOURS} nearest": pca_normals(result.points, _PCA_NEIGHBOURS)[0],
+            f"plane fit to {_PCA_NEIGHBOURS} nearest": pca_normals(result.points, _PCA_NEIGHBOURS)[0],
         }
         for panel, (name, found) in zip((above, below), ways.items(), strict=True):
             there = truth[result.source_index]
             draw_errors(panel, result.points, found, there, camera)
             agreement = np.abs(np.einsum("ni,ni->n", found, there)).mean()
-            caption(panel, f"{title}: {name}", f"{count:,} points, NC {agreement:.4f}")
+            caption(panel, f"{title}, {count:,} points", f"{name}: NC {agreement:.4f}")
     error_scale(figure, panels)
     return save(figure, path)
 
@@ -89,42 +88,61 @@ def gaps(path: Path) -> Path:
     return save(figure, path)
 
 
-def control(path: Path) -> Path:
-    """Sparse points of one cupped petal: the axes of the outermost points left alone, or held at two slants."""
-    points, truth = blue_noise(_one_petal(), 150, np.random.default_rng(0))
-    rim = np.flatnonzero(points[:, 0] > np.quantile(points[:, 0], 0.8))
-    view = View((-0.3, -1.0, 0.35))
-    camera = view.camera(points * 1.15, _PIXELS)
-    figure, panels = sheet(1, 4)
-    draw_points(panels[0, 0], points, camera)
-    caption(panels[0, 0], "150 points")
-    for panel, (title, slant) in zip(
-        panels[0, 1:], {"axes found": None, "end held 35° up": 35, "end held 35° down": -35}.items(), strict=True
-    ):
-        held = None if slant is None else (rim, _turned(truth[rim], np.radians(slant)))
-        draw_surface(panel, reconstruct(points, constraints=held).surface, camera, view)
-        caption(panel, title)
+def limits(path: Path) -> Path:
+    """Where the defaults fail: too few points, sheets closer than the points on them, heavy noise, few points at junctions."""
+    rng = np.random.default_rng(0)
+    knot, _ = uniform(closed.knot(), 10_000, rng)
+    close, (fruit, _) = _two_sheets(rng), blue_noise(junctions.strawberry(), 1_000, rng)
+    shown = [
+        ("too few points", blue_noise(closed.torus(), 100, rng)[0], View((-0.4, -1.0, 1.1))),
+        ("sheets 0.6 spacing apart", close, View((-0.5, -1.0, 0.35), 1, 0.0)),
+        ("noise of 1.5 %", knot + 0.012 * rng.normal(size=knot.shape), View((-0.3, -0.6, 1.0))),
+        ("few points at junctions", fruit, View((-0.5, -1.0, 0.6), 1, 0.0)),
+    ]
+    figure, panels = sheet(2, len(shown))
+    for (above, below), (title, points, view) in zip(panels.T, shown, strict=True):
+        _pair(above, below, points, view)
+        caption(above, title, f"{len(points):,} points")
     return save(figure, path)
 
 
-def _one_petal() -> Surface:
-    from .shapes.surface import Patch, from_patches
-
-    def position(uv):
-        across, out = 2 * uv[:, 0] - 1, uv[:, 1]
-        width = 0.15 + 0.35 * np.sin(np.pi * out * 0.85)
-        return np.stack([out, across * width, 0.4 * out**2 + 0.2 * across**2 * width], axis=1)
-
-    return from_patches([Patch(position, (60, 80))])
+def _two_sheets(rng):
+    """Random points of two flat squares 0.012 apart, on each of which they are 0.02 apart on average."""
+    points = rng.uniform(-0.4, 0.4, (3_200, 3))
+    points[:, 2] = np.repeat([0.0, 0.012], 1_600)
+    return points
 
 
-def _turned(axes, angle):
-    """The axes (n,3) turned about y."""
-    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
-    return axes @ turn.T
+def control(path: Path) -> Path:
+    """Rows of points that may be shelves or walls: axes found, held flat at two sides, held upright above and below."""
+    points = _rows()
+    reach = np.abs(points).max(axis=0) - 0.05
+    held = {
+        "axes found": None,
+        "outermost held level": (np.abs(points[:, 0]) > reach[0], (0, 0, 1)),
+        "outermost held upright": (np.abs(points[:, 2]) > reach[2], (1, 0, 0)),
+    }
+    view = View((-0.45, -1.0, 0.55))
+    camera = view.camera(points, _PIXELS)
+    figure, panels = sheet(1, 4)
+    draw_points(panels[0, 0], points, camera)
+    caption(panels[0, 0], "shelves or walls?", f"{len(points)} points")
+    for panel, (title, choice) in zip(panels[0, 1:], held.items(), strict=True):
+        rows = np.flatnonzero(choice[0]) if choice else []
+        constraints = (rows, np.tile(choice[1], (len(rows), 1)).astype(float)) if choice else None
+        draw_surface(panel, reconstruct(points, constraints=constraints).surface, camera, view)
+        caption(panel, title, f"{len(rows)} points held")
+    return save(figure, path)
 
 
-FIGURES = {"shapes": shapes, "normals": normals, "gaps": gaps, "control": control}
+def _rows():
+    """Thirteen points in each of 6 x 5 rows a square mesh apart, shaken a little."""
+    x, y, z = 0.2 * (np.arange(6) - 2.5), 0.1 * (np.arange(13) - 6), 0.2 * (np.arange(5) - 2)
+    points = np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+    return points + np.random.default_rng(0).normal(size=points.shape) * 0.006
+
+
+FIGURES = {"shapes": shapes, "normals": normals, "gaps": gaps, "control": control, "limits": limits}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -60,7 +60,7 @@ def measure_strays(case: Case, share: float) -> dict:
     """Errors of the surface with strays looked for and, for the CD, not; shares of the strays found and of the case's
     own points lost with them; pieces of the surface, and the share of its faces in the largest."""
     points = strewn(case, share)
-    result = reconstruct(points)
+    result = reconstruct(points, Settings())
     kept = np.zeros(len(points), bool)
     kept[result.source_index] = True
     own = np.arange(len(points)) < len(case.points)

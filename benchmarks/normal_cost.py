@@ -58,7 +58,7 @@ def _stage(points, spacing):
     with Clock() as building:
         facets = voronoi_facets(points, spacing)
     with Clock() as sweeping:
-        reflection_sweeps(points, facets)
+        reflection_sweeps(points, spacing, facets)
     return building, sweeping
 
 

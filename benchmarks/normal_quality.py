@@ -6,21 +6,23 @@ from pathlib import Path
 
 import igl
 import numpy as np
+from scipy import sparse
 
+from core import Mesh
 from core.cleaning.clean import clean
 from core.linalg import outer, principal_axes
 from core.normals.adam import MAX_STEPS, minimise
 from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
 from core.normals.mirrors import Mirrors
 from core.normals.pca import pca_normals
-from core.normals.reflection import reflection_sweeps
+from core.normals.reflection import reflection_sweeps, sweep_once
 from core.points import local_spacing, prepare_samples
 from core.voronoi.bisectors import bisector_samples
 from core.voronoi.facets import voronoi_facets
 from core.voronoi.polygons import facet_polygons
 
 from .cases import Case, load_case
-from .geometry import surface_points
+from .geometry import closest_faces, face_normals, surface_points
 from .metrics import normal_agreement
 from .peers import check_open3d
 
@@ -30,7 +32,7 @@ PEER_NEIGHBOURS = 30
 DENSITIES = 3_000, 10_000
 ABLATION_STEPS = 100
 CURVE_STEPS = 150
-CURVE_SWEEPS = 20  # from then on the solver holds axes back, which this module does not repeat
+CURVE_SWEEPS = 40
 
 PRINTED = EnergyWeights(distance=1, gradient=1e-3, alignment=1e2)
 _FACTORS = [(1, 1, 1), (1, 1, 10), (1, 1, 0.1), (1, 10, 1), (1, 0.1, 1), (10, 1, 1), (0.1, 1, 1)]
@@ -67,13 +69,13 @@ class Problem:
 
     @cached_property
     def mirrors(self):
-        return Mirrors(self.points, self.samples.facets)
+        return Mirrors(self.points, self.spacing, self.samples.facets)
 
     def energy(self, weights=EnergyWeights(), printed_alignment=False) -> NormalEnergy:
         return NormalEnergy(self.points, self.spacing, self.samples, weights, printed_alignment)
 
     def sweeps(self, start=None) -> np.ndarray:
-        return reflection_sweeps(self.points, self.samples.facets, start=start)[0]
+        return reflection_sweeps(self.points, self.spacing, self.samples.facets, start=start)[0]
 
     def adam(self, energy: NormalEnergy, start=None, max_steps=MAX_STEPS) -> np.ndarray:
         """Axes of least energy from the plane fit, or from `start`."""
@@ -92,6 +94,7 @@ def case_quality(path: Path, sampling: str) -> dict:
 
     closer_pca  : the best PCA over fewer neighbours than `pca` may take
     error_ratio : 1 - NC of the sweeps over that of the best PCA
+    faceting    : 1 - NC of the true surface's `rounded_normals` over that of the best PCA
     start_gap   : |NC of the sweeps from random axes - NC of the sweeps from the plane fit|
     distance_ratio : E_d of the sweeps over E_d of Adam
     cleaned     : agreement of the sweeps after the pipeline's cleaning, for noisy cases only
@@ -108,6 +111,7 @@ def case_quality(path: Path, sampling: str) -> dict:
         "printed": problem.agreement(problem.adam(problem.energy(PRINTED, True), problem.random_start())),
     }
     random = problem.agreement(problem.sweeps(problem.random_start()))
+    rounded = problem.agreement(rounded_normals(case.truth, problem.given))
     return {
         "case": case.name,
         "category": case.meta["category"],
@@ -115,6 +119,7 @@ def case_quality(path: Path, sampling: str) -> dict:
         **found,
         "closer_pca": best_pca(problem, CLOSER_NEIGHBOURS),
         "error_ratio": (1 - found["sweeps"]["nc"]) / (1 - found["pca"]["nc"]),
+        "faceting": (1 - rounded["nc"]) / (1 - found["pca"]["nc"]),
         "start_gap": abs(random["nc"] - found["sweeps"]["nc"]),
         "distance_ratio": energy.terms(swept)[0] / energy.terms(descended)[0],
         "cleaned": _cleaned(case) if case.meta["category"] == "noisy" else None,
@@ -139,9 +144,25 @@ def open3d_normals(points: np.ndarray) -> np.ndarray:
 
 def _cleaned(case):
     samples, _ = clean(prepare_samples(case.points))
-    axes = reflection_sweeps(samples.points, voronoi_facets(samples.points, local_spacing(samples.points)))[0]
+    spacing = local_spacing(samples.points)
+    axes = reflection_sweeps(samples.points, spacing, voronoi_facets(samples.points, spacing))[0]
     rows = samples.source_index
     return normal_agreement(axes, case.normals[rows], case.points[rows], case.nm_curve)
+
+
+def rounded_normals(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """Axes (n,3) at points (n,3) on a mesh as if it stood for a smooth surface: those of its vertices, interpolated.
+
+    A vertex has the axis closest to those of its faces, weighted by area; no consistent winding is needed.
+    """
+    flat, (_, face) = face_normals(mesh), closest_faces(points, mesh)
+    corner = sparse.csr_matrix((mesh.face_areas().repeat(3), (mesh.faces.ravel(), np.arange(len(flat)).repeat(3))))
+    at_vertex = principal_axes(corner @ outer(flat))[0][mesh.faces[face]]
+    side = np.einsum("nki,ni->nk", at_vertex, flat[face])
+    corners = np.ascontiguousarray(mesh.vertices[mesh.faces[face]].transpose(1, 0, 2))
+    share = igl.barycentric_coordinates(points, *corners)
+    axes = np.einsum("nk,nki->ni", share * np.sign(side), at_vertex)
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
 def ablation(case: Case) -> list[dict]:
@@ -179,7 +200,9 @@ def convergence(case: Case) -> dict:
     for name, problem in _inputs(case).items():
         _, history = minimise(problem.energy().value_and_gradient, problem.random_start(), max_steps=CURVE_STEPS)
         turns = mean_turns(problem.mirrors, problem.random_start(), CURVE_SWEEPS)
-        _, _, sweeps = reflection_sweeps(problem.points, problem.samples.facets, start=problem.random_start())
+        _, _, sweeps = reflection_sweeps(
+            problem.points, problem.spacing, problem.samples.facets, start=problem.random_start()
+        )
         energy = np.divide(history, history[0])
         curves[name] = {"points": len(problem.points), "energy": energy, "turns": turns, "sweeps": sweeps}
     return curves
@@ -188,8 +211,8 @@ def convergence(case: Case) -> dict:
 def mean_turns(mirrors: Mirrors, axes: np.ndarray, sweeps: int) -> list[float]:
     """Mean angle between the axes (n,3) before and after each sweep, degrees; at most the first CURVE_SWEEPS."""
     turns = []
-    for _ in range(sweeps):
-        turned, _ = principal_axes(mirrors.gather @ outer(mirrors.images(axes)) - mirrors.alignment)
+    for sweep in range(1, sweeps + 1):
+        turned = sweep_once(mirrors, axes, sweep)
         cosine = np.abs(np.einsum("ni,ni->n", turned, axes))
         turns.append(float(np.degrees(np.arccos(np.minimum(cosine, 1.0)).mean())))
         axes = turned
@@ -214,8 +237,5 @@ def _inputs(case):
 
 def _on_surface(case, points):
     """The points, with the normals of the true faces nearest to them."""
-    corners = case.truth.vertices[case.truth.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    _, nearest, _ = igl.point_mesh_squared_distance(points, case.truth.vertices, case.truth.faces.astype(np.int64))
-    return Problem.of(points, normals[nearest.ravel()])
+    _, nearest = closest_faces(points, case.truth)
+    return Problem.of(points, face_normals(case.truth)[nearest.ravel()])

@@ -1,6 +1,7 @@
 """Panels of the gallery: points, surfaces cut open, errors of normals."""
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib
@@ -10,7 +11,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from PIL import Image
 from scipy.spatial import KDTree
 
 from core import Mesh
@@ -20,7 +22,7 @@ from scripts.render import Camera, dome_light, render, turned_discs
 
 _LIGHTS = 40
 _WORST_ANGLE = 30.0
-_ERRORS = plt.get_cmap("magma_r")
+_ERRORS = LinearSegmentedColormap.from_list("errors", ["#c3cdd6", "#f0a35e", ACCENT, "#7a1626", "#16060a"])
 _DPI = 90
 
 
@@ -94,10 +96,6 @@ def caption(panel: plt.Axes, title: str, note: str = "") -> None:
 
 def save(figure: plt.Figure, path: Path) -> Path:
     """Write a PNG of at most 128 colours, which keeps it small."""
-    from io import BytesIO
-
-    from PIL import Image
-
     buffer = BytesIO()
     figure.savefig(buffer, dpi=_DPI)
     plt.close(figure)

@@ -14,15 +14,15 @@ _INTRODUCTION = """\
 # Results
 
 Made by `{command}`, which writes this page and the numbers behind it
-([uniform]({page}/uniform.json), [blue noise]({page}/blue_noise.json)); do not edit it by hand.
+({files}); do not edit it by hand.
 
 Every case is a point cloud without normals sampled from a known mesh, whose longest side is 0.8. Settings are the
 defaults, the same for every case; nothing is chosen per shape:
 {settings}.
 **Lengths are in the scale of the case and times 1000**, unless they are in cells of the grid (a cell is about 0.008).
-The machine has 2 shared CPU cores and no GPU, so times are given only as ratios to a peer that ran on the same points
-right after. Other work on the machine still shows: by the clock such ratios have differed up to fivefold between runs,
-in CPU time mostly by less than a third, so only the latter are worth comparing.
+The machine has 2 shared CPU cores and no GPU. Other work on it shows in every time: by the clock, ratios to a peer that
+ran on the same points right after have differed up to fivefold between runs, in CPU time mostly by less than a third,
+so only the latter are worth comparing, and only within a run.
 
 {cases}
 
@@ -55,7 +55,8 @@ in CPU time mostly by less than a third, so only the latter are worth comparing.
   Voronoi method must spend.
 - **Against the peers**: the same points, errors measured alike. *NC* here is that of the surface: mean |n·n\\*| of the
   triangles at those 200 000 points and at their closest points on the other mesh, both ways. *seconds*: by the clock,
-  {timing}. *MB*: what the run adds to the memory of a process of its own, libraries not included. Parameters
+  {timing}, and *CPU*: of all threads together, which feels other work on the machine less. *MB*: what the run adds to
+  the memory of a process of its own, libraries not included. Parameters
   of the peers come from a stated set and are **the best for each case, chosen with the truth at hand**, which favours
   them; ours are the defaults. *Clean* are cases without noise, strays, holes or wires. Scale-space
   reconstruction is not in CGAL's Python package and so is missing. Poisson closes open surfaces by design, and needs an
@@ -76,19 +77,23 @@ def write_results(runs: dict[str, dict], name: str = "results") -> Path:
     options = "" if name == "results" else f" --page {name}"
     text = _INTRODUCTION.format(
         command=f"python -m benchmarks FOLDER --results{options}{f' --repeats {repeats}' if repeats > 1 else ''}",
-        page=name,
+        files=", ".join(f"[{sampling}]({name}/{_file(sampling)})" for sampling in runs),
         settings=", ".join(f"{setting} {value}" for setting, value in first["settings"].items()),
         cases=_case_table(runs),
         timing="one run" if repeats == 1 else f"the median of {repeats} runs",
         ways=ways(),
     )
     for sampling, run in runs.items():
-        write_report(folder / f"{sampling.replace(' ', '_')}.json", run)
+        write_report(folder / _file(sampling), run)
         tables = "\n".join(part(run["cases"], level=3) for part in (peer_tables, markdown_tables))
         text += f"\n## Samples: {sampling}\n\n{tables}"
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return page
+
+
+def _file(sampling):
+    return f"{sampling.replace(' ', '_')}.json"
 
 
 def _case_table(runs):

@@ -80,6 +80,7 @@ def run_case(path: Path, sampling: str, settings: Settings, repeats: int = 1) ->
         "euler_expected": topology(case.truth)["euler"],
         "loops_expected": case.truth.border_loops(),
         "seconds": clock.seconds,
+        "cpu": clock.cpu,
     }
     poisson = reconstruct(case.points, replace(settings, surface="none", integration="poisson")).field
     measured["poisson"] = field_errors(poisson, case.truth, result.points)

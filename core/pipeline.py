@@ -14,6 +14,7 @@ from .field.local_surface import fit_local_surface
 from .field.narrow_band import banded_field, trimmed
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
+from .normals.known import known_normals
 from .points import local_spacing, prepare_samples
 from .progress import Progress
 from .reconstruction import Reconstruction
@@ -21,12 +22,16 @@ from .settings import Settings
 from .surface.extract import band_for, extract_surfaces
 
 
-def reconstruct(points, settings: Settings = Settings(), constraints=None, progress=None) -> Reconstruction:
+def reconstruct(
+    points, settings: Settings = Settings(), constraints=None, progress=None, normals=None
+) -> Reconstruction:
     """Unsigned distance field, normals and surface of a point cloud without normals.
 
     points      : (n,3) array-like of any scale and place; rows that are not finite and exact duplicates are dropped
     constraints : (indices (k,), axes (k,3)), normals to hold fixed at rows of `points`, or None
     progress    : callback (fraction, stage) -> bool or None; False cancels
+    normals     : (axes (n,3), confidence (n,)) of all points, as an earlier run found them, or None; with them the
+                  cleaning and the search for normals are left out, and constraints do not matter
 
     Example
     -------
@@ -48,7 +53,9 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         samples, given = prepare_samples(points), len(np.asarray(points))
 
     with stages("cleaning"):
-        samples, cleaning = clean(samples, settings, progress.part(0.0, 0.1, "cleaning"))
+        cleaning = {}
+        if normals is None:
+            samples, cleaning = clean(samples, settings, progress.part(0.0, 0.1, "cleaning"))
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
         spacing = local_spacing(samples.points)
         grid = fit_grid(samples.points, settings.resolution)
@@ -56,9 +63,12 @@ def reconstruct(points, settings: Settings = Settings(), constraints=None, progr
         check_budget(estimate, len(spacing), grid, settings)
 
     with stages("normals"):
-        normals, confidence, counts = estimate_normals(
-            samples.points, spacing, settings, constraints, progress.part(0.1, 0.2, "normals")
-        )
+        if normals is None:
+            part = progress.part(0.1, 0.2, "normals")
+            normals, confidence, counts = estimate_normals(samples.points, spacing, settings, constraints, part)
+        else:
+            normals, confidence = known_normals(normals, given, samples.source_index)
+            counts = {}
 
     with stages("field"):
         part = progress.part(0.2, 0.25, "distance field")

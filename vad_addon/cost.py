@@ -20,7 +20,7 @@ def cost_in_words(points: np.ndarray, settings: Settings) -> list[str]:
     samples = prepare_samples(points)
     spacing = local_spacing(samples.points)
     grid = fit_grid(samples.points, settings.resolution)
-    estimate = estimate_cost(spacing, grid)
+    estimate = estimate_cost(spacing, grid, settings)
     low, high = options()["resolution"].metadata["limits"]
     one_cell_each = grid.spacing * settings.resolution / np.median(spacing)
     return [

@@ -9,23 +9,32 @@ from ..core.errors import VADError
 from . import datablocks, materials, results, volume_files
 from .attributes import Attribute
 from .outcome import Outcome
-from .points_in import Source
+from .points_in import Source, object_of
 
-_OWN = {"normal", "confidence", "distance", "radius"}  # attributes that results set themselves
+OWN = {"normal", "confidence", "distance", "moved", "radius"}  # attributes that results set themselves
 
 
-def deliver(scene: bpy.types.Scene, source: Source, outcome: Outcome, keep_both: bool = False) -> bpy.types.Collection:
+def deliver(
+    scene: bpy.types.Scene,
+    source: Source,
+    outcome: Outcome,
+    keep_both: bool = False,
+    collection: bpy.types.Collection | None = None,
+) -> bpy.types.Collection:
     """Put the outcome into a collection "`name` VAD" of `scene`: meshes, samples and volume, all or nothing.
 
-    Where this source has results from an earlier run, these are updated, and the objects keep the materials and the
-    modifiers that the user gave them; `keep_both` makes a second collection instead.
+    Where this source has results from an earlier run, these are updated (those in `collection` where it is given), and
+    the objects keep the materials and the modifiers that the user gave them; `keep_both` makes a second collection
+    instead.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
-    for large coordinates. A volume that cannot be written becomes a warning: the other results are delivered.
+    for large coordinates. Of new results only the mesh is shown. A volume that cannot be written becomes a warning: the
+    other results are delivered.
     The collection carries the run's report as JSON in its custom property ``vad_report``; see also :mod:`results`.
     """
-    origin = next((obj for obj in bpy.data.objects if obj.session_uid == source.uid), None)
+    origin = object_of(source)
     warnings = list(outcome.warnings)
-    collection = None if keep_both else results.previous(scene, origin)
+    if collection is None and not keep_both:
+        collection = results.previous(scene, origin)
     if collection is not None and any(obj.mode != "OBJECT" for obj in collection.objects):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
@@ -35,8 +44,12 @@ def deliver(scene: bpy.types.Scene, source: Source, outcome: Outcome, keep_both:
             collection = bpy.data.collections.new(f"{source.name} VAD")
             scene.collection.children.link(collection)
         rollback.pop_all()
+    before, mesh = set(collection.objects), results.mesh(collection)
     for role in results.ROLES:
         _place(collection, role, made.get(role), outcome.origin)
+    stays = before if results.mesh(collection) == mesh else set()
+    _show_mesh_first(scene, collection, stays)
+    _colour(set(collection.objects) - before, source)
     if results.FIELD in made:
         materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell, outcome.shape)
     if origin is not None:
@@ -55,7 +68,7 @@ def _data(source, outcome, warnings, rollback):
         rollback.callback(bpy.data.batch_remove, [data])
         return data
 
-    carried = {name: attribute for name, attribute in source.attributes.items() if name not in _OWN}
+    carried = {name: attribute for name, attribute in source.attributes.items() if name not in OWN}
     carried = {name: attribute[outcome.source_index] for name, attribute in carried.items()}
     own = dict(
         normal=Attribute.of(outcome.normals),
@@ -102,9 +115,29 @@ def _place(collection, role, data, origin):
         datablocks.replace_volume(obj.data, data)
     else:
         datablocks.replace_data(obj.data, data)
-    if tuple(obj.get("vad_origin", ())) != tuple(origin):
-        obj["vad_origin"] = origin
+    if tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
+        obj[results.ORIGIN] = origin
         obj.location = origin
+
+
+def _show_mesh_first(scene, collection, stays):
+    """Show the mesh alone: samples, fog and a second mesh in the same place would cover it. What `stays` is as the user
+    left it; that is all there was, unless the mesh came or went."""
+    mesh = results.mesh(collection)
+    for role in results.ROLES:
+        obj = results.member(collection, role)
+        if obj is not None and obj not in stays:
+            results.show(scene, obj, mesh is None or obj == mesh)
+
+
+def _colour(objects, source):
+    """Give new meshes and samples a material that shows the colours their points carry, if they do."""
+    names = [name for name, attribute in source.attributes.items() if attribute.kind in {"FLOAT_COLOR", "BYTE_COLOR"}]
+    painted = [obj for obj in objects if results.role(obj) in {*results.MESHES, results.SAMPLES}]
+    if names and painted:
+        material = materials.carried_colours(f"{source.name} colours", names[0])
+        for obj in painted:
+            obj.data.materials.append(material)
 
 
 def _summary(outcome):

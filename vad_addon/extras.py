@@ -5,12 +5,12 @@ import numpy as np
 from mathutils import Vector
 
 from ..core.errors import InputError, VADError
-from . import axes, results, shapes
+from . import axes, points_in, results, shapes
 
 
 def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
     """The run whose results are meant: the one the active object belongs to, else the scene's last."""
-    obj = context.active_object
+    obj = points_in.active_object(context)
     if obj is not None:
         for collection in obj.users_collection:
             if results.REPORT in collection:
@@ -108,6 +108,38 @@ class VAD_OT_normals_to_geometry(_OfResult, bpy.types.Operator):
         return shapes.normals(collection, self.length, self.thickness, self.every)
 
 
+class VAD_OT_show(bpy.types.Operator):
+    """Show or hide this, in the viewport and in renders"""
+
+    bl_idname = "vad.show"
+    bl_label = "Show"
+    bl_options = {"UNDO"}
+
+    role: bpy.props.EnumProperty(
+        name="What",
+        description="Which of the results",
+        items=[(role, name, f"Show or hide {text}") for role, name, text in results.SHOWN],
+    )
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("There are no results yet: reconstruct first")
+        return chosen_result(context) is not None
+
+    @classmethod
+    def description(cls, context, properties):
+        return next(f"Show or hide {text}" for role, _, text in results.SHOWN if role == properties.role)
+
+    def execute(self, context):
+        collection = chosen_result(context)
+        obj = results.shown_as(collection, self.role)
+        if obj is None:
+            self.report({"ERROR"}, f"{collection.name} has no {self.role}: it was deleted, or not asked for")
+            return {"CANCELLED"}
+        results.show(context.scene, obj, obj.hide_get())
+        return {"FINISHED"}
+
+
 class _OfEditedMesh:
     bl_options = {"REGISTER", "UNDO"}
 
@@ -181,4 +213,4 @@ class VAD_OT_free_axes(_OfEditedMesh, bpy.types.Operator):
         return np.zeros(3)
 
 
-CLASSES = VAD_OT_shell, VAD_OT_slice, VAD_OT_normals_to_geometry, VAD_OT_fix_axes, VAD_OT_free_axes
+CLASSES = VAD_OT_show, VAD_OT_shell, VAD_OT_slice, VAD_OT_normals_to_geometry, VAD_OT_fix_axes, VAD_OT_free_axes

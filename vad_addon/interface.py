@@ -2,13 +2,27 @@
 
 import bpy
 
-from . import cost, extras, importer, operators, overlay, panel, preferences, presets, properties
+from . import (
+    cost,
+    extras,
+    importer,
+    operators,
+    overlay,
+    panel,
+    preferences,
+    presets,
+    properties,
+    run,
+    stages,
+    volume_files,
+)
 
 CLASSES = (
     overlay.VAD_PG_overlay,
     properties.VAD_PG_scene,
     operators.VAD_OT_reconstruct,
     operators.VAD_OT_cancel,
+    *stages.CLASSES,
     cost.VAD_OT_estimate,
     *extras.CLASSES,
     preferences.VAD_OT_clear_cache,
@@ -29,16 +43,21 @@ def register():
     bpy.types.TOPBAR_MT_file_import.append(importer.draw_menu)
     presets.register()
     bpy.app.handlers.load_post.append(preferences.prepare_scenes)
+    bpy.app.handlers.load_post.append(volume_files.delete_unused)
+    bpy.app.handlers.save_post.append(volume_files.keep_saved)
     for handlers in _NEW_DATA:
         handlers.append(overlay.on_new_data)
 
 
 def unregister():
-    operators.stop_run()
+    run.stop()
     overlay.remove()
     for handlers in _NEW_DATA:
         handlers.remove(overlay.on_new_data)
+    bpy.app.handlers.save_post.remove(volume_files.keep_saved)
+    bpy.app.handlers.load_post.remove(volume_files.delete_unused)
     bpy.app.handlers.load_post.remove(preferences.prepare_scenes)
+    volume_files.delete_unused_at_exit()
     presets.unregister()
     bpy.types.TOPBAR_MT_file_import.remove(importer.draw_menu)
     del bpy.types.Scene.vad

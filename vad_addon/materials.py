@@ -87,5 +87,23 @@ def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
     return material
 
 
+def carried_colours(name: str, attribute: str) -> bpy.types.Material:
+    """A plain surface in the colours that the points carry in `attribute`."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # before Blender 5.0
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    colour, surface, output = (
+        nodes.new(kind) for kind in ("ShaderNodeAttribute", "ShaderNodeBsdfPrincipled", "ShaderNodeOutputMaterial")
+    )
+    for place, node in enumerate((colour, surface, output)):
+        node.location.x = 300 * place
+    colour.attribute_name = attribute
+    links.new(colour.outputs["Color"], surface.inputs["Base Color"])
+    links.new(surface.outputs[0], output.inputs["Surface"])
+    return material
+
+
 def _principled(material):
     return [node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeVolumePrincipled"]

@@ -1,6 +1,7 @@
 """One run, from points to arrays that Blender can take as they are. Free of Blender: the worker process runs it too."""
 
 import json
+import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -8,31 +9,55 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..core import pipeline
+from ..core.cleaning.clean import clean
 from ..core.errors import VADError
 from ..core.io.report import report_json
 from ..core.io.vdb import write_vdb
+from ..core.normals.estimate import checked_constraints, estimate_normals
+from ..core.points import local_spacing, prepare_samples
 from ..core.progress import Progress
 from ..core.settings import Settings
+
+CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
 
 
 @dataclass(frozen=True)
 class Task:
-    """What a run is given: (n,3) float64 points, settings, and (indices (k,), axes (k,3)) or None."""
+    """What a run is given, in input units.
+
+    points      : (n,3) float64
+    constraints : (indices (k,), axes (k,3)) or None
+    until       : the last stage: CLEANING, NORMALS or ALL
+    known       : (axes (n,3), confidence (n,)) of an earlier run, which is taken up after its normals, or None
+    origin      : (3,) float64, exact in single precision, that results are to be relative to; None: their own centre
+    """
 
     points: np.ndarray
     settings: Settings
     constraints: tuple[np.ndarray, np.ndarray] | None = None
+    until: str = ALL
+    known: tuple[np.ndarray, np.ndarray] | None = None
+    origin: np.ndarray | None = None
 
     def save(self, path: Path) -> None:
-        indices, axes = self.constraints or (np.empty(0, np.int64), np.empty((0, 3)))
-        settings = json.dumps(asdict(self.settings))
-        np.savez(path, points=self.points, indices=indices, axes=axes, settings=settings)
+        arrays = {"points": self.points}
+        for name in _PAIRS:
+            if (pair := getattr(self, name)) is not None:
+                arrays |= {f"{name}.{part}": array for part, array in enumerate(pair)}
+        if self.origin is not None:
+            arrays["origin"] = self.origin
+        np.savez(path, **arrays, settings=json.dumps(asdict(self.settings)), until=self.until)
 
     @classmethod
     def load(cls, path: Path) -> "Task":
-        with np.load(path) as arrays:
-            constraints = (arrays["indices"], arrays["axes"]) if len(arrays["indices"]) else None
-            return cls(arrays["points"], Settings(**json.loads(str(arrays["settings"]))), constraints)
+        with np.load(path) as file:
+            arrays = dict(file)
+        pairs = {name: (arrays[f"{name}.0"], arrays[f"{name}.1"]) for name in _PAIRS if f"{name}.0" in arrays}
+        settings = Settings(**json.loads(str(arrays["settings"])))
+        return cls(arrays["points"], settings, until=str(arrays["until"]), origin=arrays.get("origin"), **pairs)
+
+
+_PAIRS = "constraints", "known"
 
 
 @dataclass(frozen=True)
@@ -56,6 +81,9 @@ _SKINS = "surface", "sheet"
 class Outcome:
     """What a run found, in input units; see :class:`core.Reconstruction` for points, source_index, normals, confidence.
 
+    A run that ends after the cleaning has no normals and no confidence (None). One that ends before the field has no
+    surface, sheet and volume; its `cell` is the median spacing and its `shape` is empty.
+
     surface  : Skin of the double cover or of the signed surface, or None
     sheet    : Skin of the single layer, or None
     volume   : .vdb file of the field, relative to `origin`, or None; it belongs to whoever takes the outcome
@@ -69,20 +97,21 @@ class Outcome:
 
     points: np.ndarray
     source_index: np.ndarray
-    normals: np.ndarray
-    confidence: np.ndarray
+    normals: np.ndarray | None
+    confidence: np.ndarray | None
     surface: Skin | None
     sheet: Skin | None
     volume: Path | None
     origin: np.ndarray
     cell: float
-    shape: tuple[int, int, int]
+    shape: tuple[int, ...]
     report: str
     warnings: tuple[str, ...]
     seconds: float
 
     def save(self, path: Path) -> None:
-        arrays = {name: getattr(self, name) for name in ("points", "source_index", "normals", "confidence", "origin")}
+        names = "points", "source_index", "normals", "confidence", "origin"
+        arrays = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         for skin in _SKINS:
             if (found := getattr(self, skin)) is not None:
                 arrays |= {f"{skin}.{name}": array for name, array in vars(found).items()}
@@ -104,24 +133,55 @@ class Outcome:
             names = [name for name in arrays if name.startswith(f"{skin}.")]
             found = {name.partition(".")[2]: arrays.pop(name) for name in names}
             facts[skin] = Skin(**found) if found else None
-        return cls(**arrays, **facts)
+        return cls(**dict.fromkeys(("normals", "confidence")) | arrays | facts)
 
 
 def compute(task: Task, folder: Path, progress=None) -> Outcome:
-    """Reconstruct, and write the volume into `folder`. A volume that cannot be written is a warning, no failure.
+    """Do the task, and write the volume into `folder`. A volume that cannot be written is a warning, no failure.
 
     Raises :class:`VADError` for what the core refuses and where memory runs out.
     """
     try:
-        return _compute(task, folder, Progress.of(progress))
+        run = _reconstructed if task.until == ALL else _begun
+        return run(task, folder, Progress.of(progress))
     except MemoryError as error:
         raise VADError("Out of memory: lower the resolution, or give fewer points") from error
 
 
-def _compute(task, folder, progress):
+def _begun(task, folder, progress):
+    """The first stages alone."""
+    start = time.perf_counter()
+    share = 1.0 if task.until == CLEANING else 0.5
+    samples, report = clean(prepare_samples(task.points), task.settings, progress.part(0.0, share, "cleaning"))
+    spacing = local_spacing(samples.points)
+    normals, confidence, ignored = None, None, ()
+    if task.until == NORMALS:
+        constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
+        part = progress.part(share, 1.0, "normals")
+        normals, confidence, _ = estimate_normals(samples.points, spacing, task.settings, constraints, part)
+    return Outcome(
+        points=samples.given,
+        source_index=samples.source_index,
+        normals=normals,
+        confidence=confidence,
+        surface=None,
+        sheet=None,
+        volume=None,
+        origin=centre(samples.given),
+        cell=float(np.median(spacing)) * samples.scale,
+        shape=(),
+        report=report_json({"settings": asdict(task.settings), "cleaning": report}),
+        warnings=(*samples.warnings, *ignored),
+        seconds=time.perf_counter() - start,
+    )
+
+
+def _reconstructed(task, folder, progress):
     progress.part(0.0, 0.0, "points")(0.0)
-    result = pipeline.reconstruct(task.points, task.settings, task.constraints, progress.part(0.0, 0.95))
-    origin = centre(result.points)
+    result = pipeline.reconstruct(
+        task.points, task.settings, task.constraints, progress.part(0.0, 0.95), normals=task.known
+    )
+    origin = centre(result.points) if task.origin is None else task.origin
     finish = progress.part(0.95, 1.0, "volume")
     finish(0.0)
     warnings = list(result.report["warnings"])
@@ -142,7 +202,7 @@ def _compute(task, folder, progress):
         volume=volume,
         origin=origin,
         cell=result.field.spacing,
-        shape=result.field.values.shape,
+        shape=result.field.shape,
         report=report_json(result.report),
         warnings=tuple(warnings),
         seconds=sum(result.report["seconds"].values()),

@@ -160,7 +160,7 @@ def _draw():
     shader.bind()
     shader.uniform_float("viewportSize", (context.region.width, context.region.height))
     shader.uniform_float("lineWidth", style.width)
-    for obj in context.visible_objects:
+    for obj in _shown(context.visible_objects):
         for batch in _batches_of(obj, style, shader):
             with gpu.matrix.push_pop():
                 gpu.matrix.multiply_matrix(obj.matrix_world)
@@ -169,8 +169,15 @@ def _draw():
     gpu.state.depth_test_set("NONE")
 
 
+def _shown(visible):
+    """The visible objects, and the samples of each run of which anything is visible: they may be hidden themselves."""
+    runs = {run for obj in visible if results.role(obj) for run in obj.users_collection}
+    samples = filter(None, (results.member(run, results.SAMPLES) for run in runs))
+    return {*visible, *samples}
+
+
 def _batches_of(obj, style, shader):
-    if results.role(obj) == results.SAMPLES and obj.type == "POINTCLOUD":
+    if results.role(obj) in {results.SAMPLES, results.ESTIMATE} and obj.type == "POINTCLOUD":
         make = _normal_lines
     elif axes.held_by(obj):
         make = _fixed_lines

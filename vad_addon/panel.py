@@ -3,7 +3,7 @@
 import bpy
 
 from ..core.settings import options
-from . import extras, job, results, shapes, status
+from . import extras, job, results, shapes, stages, status
 from .cost import VAD_OT_estimate
 from .message import draw_message
 from .operators import VAD_OT_cancel, VAD_OT_reconstruct
@@ -41,6 +41,9 @@ class VAD_PT_reconstruct(_Sidebar, bpy.types.Panel):
         again = results.previous(context.scene, objects[0]) if objects else None
         _settings_column(layout, stored, [*extra, *MAIN_SETTINGS, *(["keep_both"] if again else [])])
         layout.operator(VAD_OT_reconstruct.bl_idname, icon="OUTLINER_OB_MESH")
+        row = layout.row(align=True)
+        row.operator(stages.VAD_OT_denoise.bl_idname, icon="SMOOTHCURVE")
+        row.operator(stages.VAD_OT_normals.bl_idname, icon="NORMALS_FACE")
         layout.operator(VAD_OT_estimate.bl_idname, icon="QUESTION")
 
 
@@ -69,6 +72,7 @@ class VAD_PT_last_run(_Sidebar, bpy.types.Panel):
             lines.label(text=line, icon="BLANK1")
         for warning in results.warnings(result):
             draw_message(self.layout, warning, "ERROR")
+        self.layout.operator(stages.VAD_OT_reextract.bl_idname, icon="FILE_REFRESH")
 
 
 class VAD_PT_look(_Sidebar, bpy.types.Panel):
@@ -80,6 +84,13 @@ class VAD_PT_look(_Sidebar, bpy.types.Panel):
         return extras.chosen_result(context) is not None
 
     def draw(self, context):
+        collection, layer = extras.chosen_result(context), context.view_layer
+        row = self.layout.row(align=True)
+        for role, name, _ in results.SHOWN:
+            obj = results.shown_as(collection, role)
+            if obj is not None and obj.name in layer.objects:
+                shown = not obj.hide_get()
+                row.operator(extras.VAD_OT_show.bl_idname, text=name, depress=shown).role = role
         column = self.layout.column(align=True)
         column.operator(extras.VAD_OT_shell.bl_idname, icon="MOD_SOLIDIFY")
         column.operator(extras.VAD_OT_slice.bl_idname, icon="MOD_BOOLEAN")

@@ -32,11 +32,21 @@ class Source:
     constraints: tuple[np.ndarray, np.ndarray] | None
 
 
+def object_of(source: Source) -> bpy.types.Object | None:
+    """The first object that the points came from, as long as it exists."""
+    return next((obj for obj in bpy.data.objects if obj.session_uid == source.uid), None)
+
+
+def active_object(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active object, hidden as it may be: Blender's own `active_object` is None then, in a window."""
+    return context.active_object or context.view_layer.objects.active
+
+
 def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects to reconstruct: those selected, the active one first; the active one alone where it is not selected.
     Where these are results of earlier runs only, what the active one was made from, so that a run can be repeated with
     its results at hand."""
-    active, chosen = context.active_object, list(context.selected_objects)
+    active, chosen = active_object(context), list(context.selected_objects)
     if active in chosen:
         chosen.sort(key=lambda obj: obj != active)
     elif active is not None:
@@ -51,7 +61,7 @@ def selection_problem(context: bpy.types.Context) -> str:
     """Why nothing can be reconstructed, one line; empty where something can."""
     if sources(context):
         return ""
-    obj = context.active_object
+    obj = active_object(context)
     if obj is None:
         return "No active object: select a point cloud or a mesh"
     kind = obj.type.replace("_", " ").lower()

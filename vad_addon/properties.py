@@ -2,7 +2,7 @@
 
 import bpy
 
-from ..core.settings import Settings, options
+from ..core.settings import Settings, default_in_words, options
 from .overlay import VAD_PG_overlay
 
 RUN_OPTIONS = {
@@ -27,10 +27,19 @@ def settings_properties(**keywords) -> dict:
     return {name: setting_property(option, **keywords) for name, option in options().items()}
 
 
-def settings_from(stored, override=None) -> Settings:
+def taken_over(stored, properties, names) -> dict:
+    """The values of an operator's `properties` of these names; what was not set takes the value that `stored` holds, so
+    that the redo panel starts from what is."""
+    for name in names:
+        if not properties.is_property_set(name):
+            setattr(properties, name, getattr(stored, name))
+    return {name: getattr(properties, name) for name in names}
+
+
+def settings_from(stored, override=None, **given) -> Settings:
     """Settings held by `stored` (a :class:`VAD_PG_scene`), except those that were set explicitly in `override`
-    (an operator's ``properties``). Raises :class:`SettingsError`."""
-    return Settings(**{name: _exact(value) for name, value in _merged(options(), stored, override).items()})
+    (an operator's ``properties``) and those `given`. Raises :class:`SettingsError`."""
+    return Settings(**{name: _exact(value) for name, value in (_merged(options(), stored, override) | given).items()})
 
 
 def chosen(stored, override=None) -> dict[str, bool]:
@@ -50,7 +59,9 @@ def setting_property(option, **keywords):
     metadata = option.metadata
     unit = f". Unit: {metadata['unit']}" if metadata["unit"] else ""
     keywords |= dict(
-        name=option.name.replace("_", " ").title(), description=metadata["help"] + unit, default=option.default
+        name=option.name.replace("_", " ").title(),
+        description=metadata["help"] + unit,
+        default=default_in_words(option),
     )
     if metadata["choices"]:
         items = [(choice, choice.title(), "") for choice in metadata["choices"]]

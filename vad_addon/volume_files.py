@@ -1,14 +1,21 @@
 """Where the .vdb files live: Blender's volumes are always read from disk."""
 
+import atexit
+import contextlib
 import shutil
+import time
 from pathlib import Path
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ..core.errors import VADError
 from ..core.io.atomic import atomic_path, writable_folder
 
 PACKAGE = __package__.rpartition(".")[0]
+
+_QUITTING = 20.0  # seconds that Blender may take to quit
+_made = set()  # files of this session that may be out of use once its undo history is gone
 
 
 def adopt(name: str, temporary: Path) -> Path:
@@ -23,7 +30,44 @@ def adopt(name: str, temporary: Path) -> Path:
     except BaseException:
         path.unlink(missing_ok=True)
         raise
+    _made.add(path.resolve())
     return path
+
+
+def used() -> set[Path]:
+    """The .vdb files that volumes of the open .blend read."""
+    return {Path(bpy.path.abspath(v.filepath, library=v.library)).resolve() for v in bpy.data.volumes}
+
+
+@persistent
+def keep_saved(*_) -> None:
+    """After a save: the files that the .blend now reads stay for good."""
+    _made.difference_update(used())
+
+
+@persistent
+def delete_unused(*_) -> None:
+    """Delete the files that were made since the last call, read by no saved .blend and not by the open one: volumes
+    that were updated, undone or deleted. Call it when the undo history, which could bring these back, is gone."""
+    _delete(_made - used())
+    _made.clear()
+
+
+def delete_unused_at_exit() -> None:
+    """The same at the end of the session. Blender disables its extensions then; so does the user at times, who can
+    undo and save afterwards, and nothing tells one from the other but how soon the end comes."""
+    atexit.register(_delete_if_soon, _made - used(), time.monotonic() + _QUITTING)
+
+
+def _delete_if_soon(paths, deadline):
+    if time.monotonic() < deadline:
+        _delete(paths)
+
+
+def _delete(paths):
+    for path in paths:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
 
 
 def blender_path(path: Path) -> str:
@@ -71,10 +115,10 @@ def clear_cache() -> int:
 
     Raises :class:`VADError` where one cannot be deleted.
     """
-    used = {Path(bpy.path.abspath(volume.filepath)).resolve() for volume in bpy.data.volumes}
+    shown = used()
     freed = 0
     for path in cache_folder().rglob("*.vdb"):
-        if path.resolve() not in used:
+        if path.resolve() not in shown:
             size = path.stat().st_size
             try:
                 path.unlink()

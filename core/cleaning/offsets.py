@@ -102,10 +102,10 @@ class OffsetEnergy:
         return terms, np.stack([distance, self.spacing * alignment, regular])
 
 
-def alternate(points, settings: Settings = Settings(solver="energy"), progress=None):
+def alternate(points, settings: Settings = Settings(), progress=None):
     """Positions and axes of noisy samples (n,3) by turns, until the largest tenth of the axes' changes average SETTLED.
 
-    settings.solver : how the axes are found; "energy" is the paper's
+    settings.solver : how the axes are found; "energy" is the paper's way
     Returns the moved samples (n,3), their axes (n,3) and the change of the axes in each round.
     """
     progress = Progress.of(progress)

@@ -116,16 +116,22 @@ def table_shape(shape) -> tuple[int, int, int]:
     return tuple(-(-n // SIDE) for n in shape)
 
 
-def node_gradient(values: "np.ndarray | Blocks", spacing: float):
-    """Central differences at every node, the last axis x, y, z: float32 (nx,ny,nz,3), or Blocks' stored nodes
-    (b,8,8,8,3)."""
+def node_gradient(values: "np.ndarray | Blocks", spacing: float) -> "np.ndarray | Blocks":
+    """Central differences of float32 values at every node, the last axis x, y, z. In Blocks zero at nodes with a
+    neighbour that has the value of a constant block or more."""
     if isinstance(values, np.ndarray):
         return np.stack(np.gradient(values, np.float32(spacing)), axis=-1)
     slopes = np.empty((*values.stored.shape, 3), np.float32)
-    for rows, padded in values.padded():
-        for axis in range(3):
-            slopes[rows, ..., axis] = np.gradient(padded, np.float32(spacing), axis=axis + 1)[:, 1:-1, 1:-1, 1:-1]
-    return slopes
+    middle = (slice(None), *(slice(1, -1),) * 3)
+    limit = np.abs(values.outer).max()
+    for rows, around in values.padded():
+        known = np.ones(around[middle].shape, bool)
+        for axis in (1, 2, 3):
+            slopes[rows, ..., axis - 1] = np.gradient(around, np.float32(spacing), axis=axis)[middle]
+            for shift in (-1, 1):
+                known &= np.abs(np.roll(around, shift, axis=axis)[middle]) < limit
+        slopes[rows][~known] = 0
+    return replace(values, stored=slopes, outer=np.zeros(values.slot.shape, np.float32))
 
 
 def marked_nodes(mask: "np.ndarray | Blocks") -> np.ndarray:

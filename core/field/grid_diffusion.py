@@ -17,6 +17,7 @@ from .grid import Grid
 
 LEAST_LENGTH = 0.5  # cells of sqrt(t)
 FARTHEST = 33.0  # sqrt(t); exp(-33) is about 20 times the rounding of float64
+_CHUNK = 1 << 16  # nodes
 
 _CORNERS = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(8, 3)
 
@@ -56,15 +57,21 @@ def grid_axes(points, normals, spacing, grid: Grid, stride: int = 1, progress=No
     leaning = np.einsum("nca,na->nc", slope, normals)
     sources = [(share, tensors[:, c]) for c in range(6)] + [(leaning, vectors[:, c]) for c in range(3)]
     found = []
-    for part, strength in sources:
-        progress(len(found) / len(sources))
+    for part, strength in progress.part(0.0, 0.8).each(sources):
         source = np.bincount(node.ravel(), (part * strength[:, None]).ravel(), np.prod(grid.shape))
         solution = _screened_poisson(source.reshape(grid.shape), _diffusion_length(spacing) / grid.spacing)
         found.append(solution[::stride, ::stride, ::stride].copy())
-    axes, _ = principal_axes(np.stack(found[:6], axis=-1).reshape(-1, 6))
-    direction = np.stack(found[6:], axis=-1).reshape(-1, 3)
-    axes *= np.where(np.einsum("mi,mi->m", axes, direction) < 0, -1.0, 1.0)[:, None]
-    return axes.reshape(*found[0].shape, 3)
+    fused = np.stack(found, axis=-1)
+    axes = np.empty((*fused.shape[:3], 3))
+    for slab in progress.part(0.8, 1.0).chunks(len(fused), max(1, _CHUNK // fused[0, ..., 0].size)):
+        axes[slab] = _fused(fused[slab].reshape(-1, 9)).reshape(axes[slab].shape)
+    return axes
+
+
+def _fused(components):
+    """The principal axis of the tensors (m,6) that stand first, signed by the vectors (m,3) that follow."""
+    axes, _ = principal_axes(components[:, :6])
+    return axes * np.where(np.einsum("mi,mi->m", axes, components[:, 6:]) < 0, -1.0, 1.0)[:, None]
 
 
 def _diffusion_length(spacing):
@@ -88,4 +95,6 @@ def _screened_poisson(source, length):
     """Solution of (1 - length^2 Laplacian) Y = source, (nx,ny,nz), `length` in cells."""
     modes = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in source.shape]
     symbol = 1 + length**2 * (modes[0][:, None, None] + modes[1][:, None] + modes[2])
-    return idctn(dctn(source, workers=-1) / symbol, workers=-1, overwrite_x=True)
+    spectrum = dctn(source, workers=-1, overwrite_x=True)
+    spectrum /= symbol
+    return idctn(spectrum, workers=-1, overwrite_x=True)

@@ -16,8 +16,8 @@ from .integration import BAND, NearBand, sample_reach
 from .local_surface import LocalSurface, Projection
 
 _HALF = 0.5 * np.sqrt(3)  # cells, from the middle of a group of 2^3 nodes to each of them
-_MARGIN = 0.5  # cells, by which a projection may err in leaving a group out
-_PIECE = 1 << 19  # nodes or groups at a time
+_MARGIN = 1.0  # cells, by which a projection may err in leaving a group out
+_PIECE = 1 << 17  # nodes or groups at a time
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
 

@@ -4,6 +4,8 @@ import os
 
 import numpy as np
 
+from ..field.blocks import node_gradient
+from ..field.distance_field import BandedField
 from ..reconstruction import Reconstruction
 from .atomic import atomic_path
 
@@ -20,19 +22,32 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
                 the distance grows along; zero at nodes on the surface
     foot      : (b,3) float64, the point of the surface that the distance is measured to
 
+    Of a field in a band there are, in place of the first two, blocks of 8^3 nodes; nodes elsewhere are further from the
+    surface than `band`:
+
+    block     : (k,3) int32, indices (i,j,k) of the lowest node of each     shape : (3,) int64, nodes of the whole box
+    values    : (k,8,8,8) float32                                           band  : float64, its half width
+    gradient  : (k,8,8,8,3) float32, zero within a cell of the band's end
+
     Raises :class:`VADError` where the file cannot be written whole.
     """
     field, near = result.field, result.near
     length = np.linalg.norm(near.step, axis=1, keepdims=True)
-    node = np.stack(np.unravel_index(near.node, field.values.shape), axis=1)
+    node = np.stack(np.unravel_index(near.node, field.shape), axis=1)
+    if isinstance(field, BandedField):
+        gradient = node_gradient(field.blocks, field.spacing).stored
+        values = dict(values=field.blocks.stored, block=field.blocks.corners().astype(np.int32))
+        values |= dict(shape=field.shape, band=field.band)
+    else:
+        values, gradient = dict(values=field.values), node_gradient(field.values, field.spacing)
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         np.savez_compressed(
             file,
-            values=field.values,
+            **values,
             origin=field.origin,
             spacing=field.spacing,
             signed=field.sdf,
-            gradient=np.stack(np.gradient(field.values, np.float32(field.spacing)), axis=-1),
+            gradient=gradient,
             node=node.astype(np.int32),
             direction=(near.step / np.where(length > 0, length, 1.0)).astype(np.float32),
             foot=field.origin + field.spacing * node - near.step,

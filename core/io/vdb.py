@@ -6,20 +6,23 @@ import struct
 import numpy as np
 
 from ..errors import VADError
-from ..field.distance_field import DistanceField
+from ..field.blocks import each, node_gradient
+from ..field.distance_field import BandedField, DistanceField
 from .atomic import atomic_path
-from .openvdb_module import load_openvdb
+from .openvdb_module import fill, load_openvdb
 
 _FOG_CELLS = 2.0  # the visible fog fades out at this distance from the surface
 
 
-def write_vdb(path: str | os.PathLike, field: DistanceField, gradient: bool = False) -> None:
+def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradient: bool = False) -> None:
     """Write `field` as the OpenVDB file `path`, 32-bit floats, placed by voxel size and origin in input units.
 
     udf      : the distances. Background: the band's half width, or the largest distance of a dense field, whose
-               values are kept over the whole box. Signed distances are named sdf instead, a level set
+               values are kept over the whole box. Signed distances are named sdf instead, a level set. Of a
+               :class:`BandedField` only the blocks near the surface are in the file
     density  : fog to look at, ``clip(1 - |distance| / (2 cells), 0, 1)``, background 0
-    gradient : (only if asked) vectors along which the distance grows, unit-free, by central differences
+    gradient : (only if asked) vectors along which the distance grows, unit-free, by central differences; within a band
+               zero for its last cell
 
     Raises :class:`MissingDependency` without OpenVDB, :class:`VADError` where the file cannot be written whole.
     """
@@ -32,9 +35,12 @@ def write_vdb(path: str | os.PathLike, field: DistanceField, gradient: bool = Fa
 
 
 def _grids(openvdb, field, gradient):
-    values = np.asarray(field.values, np.float32)
-    background = field.band if np.isfinite(field.band) else values.max()
-    fog = np.clip(1 - np.abs(values) / (_FOG_CELLS * field.spacing), 0, 1)
+    if isinstance(field, BandedField):
+        values, background = field.blocks, np.abs(field.blocks.outer).max()
+    else:
+        values = np.asarray(field.values, np.float32)
+        background = field.band if np.isfinite(field.band) else values.max()
+    fog = each(lambda u: np.clip(1 - np.abs(u) / np.float32(_FOG_CELLS * field.spacing), 0, 1), values)
     name = "sdf" if field.sdf else "udf"
     grids = [
         _grid(openvdb, field, openvdb.FloatGrid(float(np.float32(background))), name, values),
@@ -44,14 +50,13 @@ def _grids(openvdb, field, gradient):
         grids[0].gridClass = openvdb.GridClass.LEVEL_SET
     grids[1].gridClass = openvdb.GridClass.FOG_VOLUME
     if gradient:
-        slopes = np.stack(np.gradient(values, np.float32(field.spacing)), axis=-1)
-        grids.append(_grid(openvdb, field, openvdb.Vec3SGrid(), "gradient", slopes))
+        grids.append(_grid(openvdb, field, openvdb.Vec3SGrid(), "gradient", node_gradient(values, field.spacing)))
     return grids
 
 
 def _grid(openvdb, field, grid, name, array):
     grid.name = name
-    grid.copyFromArray(array)
+    fill(grid, array)
     grid.transform = openvdb.createLinearTransform(voxelSize=float(field.spacing))
     grid.transform.postTranslate([float(x) for x in field.origin])
     return grid

@@ -40,7 +40,9 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     if settings.solver == "energy":
         return _least_energy(points, spacing, settings, constraints, progress)
     facets = voronoi_facets(points, spacing, settings.seed, progress.part(0.0, 0.7))
-    normals, confidence, sweeps = reflection_sweeps(points, facets, constraints, progress=progress.part(0.7, 1.0))
+    normals, confidence, sweeps = reflection_sweeps(
+        points, spacing, facets, constraints, progress=progress.part(0.7, 1.0)
+    )
     return normals, confidence, {"facets": len(facets.pairs), "sweeps": sweeps}
 
 
@@ -48,7 +50,7 @@ def _least_energy(points, spacing, settings, constraints, progress):
     polygons = facet_polygons(points, spacing, settings.seed, progress.part(0.0, 0.1))
     samples = bisector_samples(polygons, spacing, seed=settings.seed)
     progress(0.2)
-    energy, mirrors = NormalEnergy(points, spacing, samples), Mirrors(points, samples.facets)
+    energy, mirrors = NormalEnergy(points, spacing, samples), Mirrors(points, spacing, samples.facets)
     backend = settings.backend
     if backend == "auto":
         backend = "torch" if find_spec("torch") else "numpy"

@@ -7,18 +7,27 @@ from ..linalg import outer, principal_axes
 from ..voronoi.facets import Facets
 
 
+_CLOSEST = 0.5  # local spacings
+
+
 class Mirrors:
     """The neighbours of every sample, each weighted by facet area / distance, with weights that sum to 1.
 
-    points : (n,3) float64
-    facets : Facets between them
+    points  : (n,3) float64
+    spacing : (n,) float64, local spacing of each sample, units of `points`
+    facets  : Facets between them
+
+    Distances below half a local spacing count as that much. Two samples almost on top of each other would otherwise
+    hear little but one another, and any two axes across their direction that mirror each other would stay as they are:
+    from random axes 1 - |n.n_true| ended up to .0026 higher than from a plane fit on points in random places.
     """
 
-    def __init__(self, points: np.ndarray, facets: Facets):
+    def __init__(self, points: np.ndarray, spacing: np.ndarray, facets: Facets):
         self.site, self.other = np.concatenate([facets.pairs, facets.pairs[:, ::-1]]).T
         step = points[self.other] - points[self.site]
         length = np.linalg.norm(step, axis=1)
-        weight = np.tile(facets.area, 2) / length
+        nearest = _CLOSEST * 0.5 * (spacing[self.site] + spacing[self.other])
+        weight = np.tile(facets.area, 2) / np.maximum(length, nearest)
         total = np.bincount(self.site, weights=weight, minlength=len(points))
         weight /= np.where(total > 0, total, 1.0)[self.site]
         self.direction = step / length[:, None]

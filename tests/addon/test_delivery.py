@@ -55,6 +55,28 @@ def test_samples_and_surface_carry_what_the_source_carried(run, scan, sphere):
     assert_allclose(values(surface, "Col", "color", 4)[:, :3], 0.5 + 0.5 * sphere[label], atol=1e-6)
 
 
+def test_colours_of_a_ply_are_seen_on_the_surface(blender, folder, sphere):
+    colours = np.rint(255 * (0.5 + 0.5 * sphere)).astype(int)
+    names = ("float x", "float y", "float z", "uchar red", "uchar green", "uchar blue")
+    rows = (" ".join(map(str, row)) for row in zip(*sphere.T, *colours.T, strict=True))
+    header = ["ply", "format ascii 1.0", "element vertex 500", *(f"property {name}" for name in names), "end_header"]
+    (folder / "painted.ply").write_text("\n".join([*header, *rows, ""]))
+    blender.ops.wm.ply_import(filepath=str(folder / "painted.ply"), import_colors="LINEAR")
+    blender.ops.vad.reconstruct(resolution=24)
+    made = {obj["vad_role"]: obj for obj in blender.context.scene.vad.result.objects}
+    surface = made["surface"].data
+    assert surface.color_attributes.active_color_name == "Col"
+    world = positions(surface) + np.array(made["surface"].location)
+    assert np.abs(values(surface, "Col", "color", 4)[:, :3] - (0.5 + 0.5 * world)).max() < 0.2  # 1.5 spacings
+    (material,) = surface.materials
+    assert material == made["samples"].data.materials[0]
+    shader = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
+    assert shader.inputs["Base Color"].links[0].from_node.attribute_name == "Col"
+    material.name = "Mine"
+    blender.ops.vad.reconstruct(resolution=32)
+    assert [found.name for found in made["surface"].data.materials] == ["Mine"]
+
+
 def test_the_surface_knows_distance_and_confidence(run, scan):
     made = run()
     surface, samples = made["surface"].data, made["samples"].data
@@ -73,7 +95,8 @@ def test_a_second_run_updates_in_place(blender, run, scan):
     assert {mesh.name for mesh in blender.data.meshes} == {"Scan", "Scan surface"}
     assert len(second["surface"].data.vertices) > 1.3 * coarse
     assert second["field"].data.filepath == "//vad/Scan_001.vdb"
-    assert len(blender.data.materials) == len(blender.data.volumes) == len(blender.data.pointclouds) == 1
+    assert {material.name for material in blender.data.materials} == {"Scan field", "Scan colours"}
+    assert len(blender.data.volumes) == len(blender.data.pointclouds) == 1
 
 
 def test_materials_modifiers_and_places_survive(blender, run, scan):
@@ -182,6 +205,72 @@ def test_an_update_is_one_undo_step(blender, run, scan):
     assert volume.grids.load()
 
 
+def shown(made):
+    seen = {role for role, obj in made.items() if not obj.hide_get()}
+    assert seen == {role for role, obj in made.items() if not obj.hide_render}
+    return seen
+
+
+def test_of_new_results_only_the_mesh_is_shown(run, scan):
+    assert shown(run()) == {"surface"}
+    assert shown(run(surface="both")) == {"surface"}
+    assert shown(run(surface="none")) == {"samples", "field"}
+    assert shown(run(surface="single")) == {"sheet"}
+
+
+def test_what_the_user_shows_and_hides_stays_so(blender, run, scan):
+    made = run(surface="both")
+    assert blender.ops.vad.show(role="field") == {"FINISHED"}
+    blender.ops.vad.show(role="sheet")
+    blender.ops.vad.show(role="surface")
+    assert shown(made) == {"field", "sheet"}
+    assert shown(run(surface="both")) == {"field", "sheet"}
+
+
+def test_the_scan_is_shown_and_hidden_like_its_results(blender, run, scan):
+    run()
+    for hidden in (True, False):
+        blender.ops.vad.show(role="source")
+        assert (scan.hide_get(), scan.hide_render) == (hidden, hidden)
+    with pytest.raises(RuntimeError, match="Scan VAD has no sheet: it was deleted, or not asked for"):
+        blender.ops.vad.show(role="sheet")
+
+
+def test_the_mesh_takes_the_stage_from_all_that_it_was_made_of(blender, run, scan, add_mesh, sphere, extension):
+    results = extension("vad_addon.results")
+    blender.ops.vad.normals()
+    other = add_mesh("Other", sphere + 3)
+    made = run()
+    results.take_the_stage(blender.context, made["surface"], [scan.session_uid, other.session_uid])
+    assert blender.context.view_layer.objects.active == made["surface"]
+    assert blender.context.selected_objects == [made["surface"]]
+    assert all(obj.hide_get() for obj in (scan, other, blender.data.objects["Scan normals"]))
+    assert run(resolution=32) == made
+
+
+@pytest.mark.parametrize("elsewhere", ["editing", "active"])
+def test_who_went_on_to_something_else_is_not_disturbed(blender, run, scan, add_mesh, sphere, extension, elsewhere):
+    made = run()
+    if elsewhere == "editing":
+        blender.ops.object.mode_set(mode="EDIT")
+    else:
+        add_mesh("Other", sphere)
+    active = blender.context.view_layer.objects.active
+    extension("vad_addon.results").take_the_stage(blender.context, made["surface"], [scan.session_uid])
+    assert blender.context.view_layer.objects.active == active
+    assert not scan.hide_get()
+
+
+def test_the_overlay_shows_hidden_samples_while_their_run_is_seen(blender, run, scan, extension):
+    drawn = extension("vad_addon.overlay")._shown
+    made = run()
+    assert made["samples"] in drawn(blender.context.visible_objects)
+    made["surface"].hide_set(True)
+    assert made["samples"] not in drawn(blender.context.visible_objects)
+    made["samples"].hide_set(False)
+    assert made["samples"] in drawn(blender.context.visible_objects)
+
+
 @pytest.mark.slow
 def test_cycles_shows_the_volume_at_any_scale(blender, run, scan):
     scene = blender.context.scene
@@ -200,8 +289,8 @@ def test_cycles_shows_the_volume_at_any_scale(blender, run, scan):
     for scale in (0.1, 100.0):
         scan.scale = scale, scale, scale
         made = run()
-        for role in ("samples", "surface"):
-            made[role].hide_render = True
+        for role, obj in made.items():
+            obj.hide_render = role != "field"
         scan.hide_render = True
         camera.location = 0, 0, 4 * scale
         camera.data.clip_end = 10 * scale

@@ -159,6 +159,13 @@ def test_an_active_object_that_is_not_selected_stands_alone(gather, add_mesh, sp
     assert (found.uid, len(found.points)) == (scan.session_uid, 500)
 
 
+def test_an_overridden_context_names_the_object(blender, gather, add_mesh, sphere):
+    other = add_mesh("Other", sphere[:7])
+    add_mesh("Active", sphere)
+    with blender.context.temp_override(active_object=other, selected_objects=[other]):
+        assert gather().name == "Other"
+
+
 def test_a_selected_camera_does_not_matter(blender, gather, add, add_mesh, sphere):
     scan = add_mesh("Scan", sphere)
     add("Eye", blender.data.cameras.new("Eye"))

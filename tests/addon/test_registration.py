@@ -48,6 +48,8 @@ class Layout:
     def column(self, align=False):
         return self
 
+    row = column
+
     def label(self, text, icon="NONE"):
         self.texts.append(text)
 
@@ -74,7 +76,7 @@ def test_the_tab_shows_every_setting_once(blender, extension):
     panels = [drawn(blender, extension, name) for name in ("VAD_PT_reconstruct", "VAD_PT_more_settings")]
     assert panels[0].props == ["resolution", "bridge", "offset"]
     assert sorted(panels[0].props + panels[1].props) == sorted(extension("core.settings").options())
-    assert panels[0].operators == ["vad.reconstruct", "vad.estimate"]
+    assert panels[0].operators == ["vad.reconstruct", "vad.denoise", "vad.normals", "vad.estimate"]
 
 
 def test_the_tab_names_what_is_selected(blender, extension, add, add_mesh):

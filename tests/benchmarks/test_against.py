@@ -12,7 +12,7 @@ from benchmarks.run import run_peers
 
 
 def measures(cd, **more):
-    return {"cd": cd, "hd": 10 * cd, "nc": 0.9, "seconds": 1.0, "memory_mb": 5.0, "variant": None, **more}
+    return {"cd": cd, "hd": 10 * cd, "nc": 0.9, "seconds": 1.0, "cpu": 1.5, "memory_mb": 5.0, "variant": None, **more}
 
 
 def result(case, double, single, category="open", **peers):
@@ -21,7 +21,7 @@ def result(case, double, single, category="open", **peers):
         "category": category,
         "mesh": measures(double),
         "sheet": measures(single),
-        "seconds": {"total": 2.0},
+        "seconds": {"total": 2.0, "cpu": 3.0},
         "memory_mb": 7.0,
         "peers": {name: measures(cd) if isinstance(cd, float) else {"error": cd} for name, cd in peers.items()},
     }
@@ -51,8 +51,8 @@ def test_tables_show_the_lowest_and_what_failed():
     assert lines[0].split(" | ")[1:3] == ["VAD, double cover", "VAD, single layer"]
     assert lines[2] == "| a | **1.000** | 1.500 | 2.000 | failed | 0.50 |"
     rows = full_table(results).splitlines()[2:]
-    assert rows[0] == "| a | VAD, double cover | – | 1.000 | 10.0 | 0.9000 | 2.00 | 7 |"
-    assert rows[3] == "| a | advancing front | crashed | – | – | – | – | – |"
+    assert rows[0] == "| a | VAD, double cover | – | 1.000 | 10.0 | 0.9000 | 2.00 | 3.00 | 7 |"
+    assert rows[3] == "| a | advancing front | crashed | – | – | – | – | – | – |"
     assert len({line.count("|") for line in rows}) == 1
     assert peer_tables([{"case": "b", "error": "MemoryError"}]) == ""
 

@@ -134,8 +134,8 @@ def test_costs_are_measured(tmp_path):
 
 def numbers(ours: float, rim: float) -> dict:
     """What `measure` returns, for one case of this error near the surface and this u / d past rims; all else is 1."""
-    pair = {"box": 1.0, "near": 1.0}
-    ways = dict.fromkeys(tables.WAYS, pair) | {"ours": {"box": 1.0, "near": ours}, "grid": None}
+    errors = {"box": 1.0, "near": 1.0, "nodes": 1.0}
+    ways = dict.fromkeys(tables.WAYS, errors) | {"ours": {"box": 1.0, "near": ours, "nodes": ours}, "grid": None}
     ratio = {"mean": rim, "off": abs(rim - 1), "p05": rim, "p95": rim, "points": 100}
     past = {way: {"4": ratio, "8": ratio, "16": ratio, "near": 1.0} for way in (*tables.BORDERS, "nearest")}
     place = np.linspace(0, 1, 20)
@@ -181,7 +181,7 @@ def test_verdicts_follow_the_numbers():
     good, bad = (list(verdicts(numbers(*pair))) for pair in ((0.4, 1.05), (1.0, 0.8)))
     assert [line.startswith("**Met**") for line in good] == [True] * 6 + [False, False, True]
     assert [line.startswith("**Met**") for line in bad] == [True] + [False] * 8
-    assert good[6].endswith("closer than ours on no case.")
+    assert good[6].endswith("on no clean case; at the nodes on none.")
     assert "a (1.00, ours 1.00)" in bad[2]
     assert "within 20.0% of d" in bad[8]
 

@@ -16,12 +16,13 @@ from benchmarks.normal_quality import (
     best_pca,
     combinations,
     mean_turns,
+    rounded_normals,
     surface_problem,
 )
 from benchmarks.normals import main, verdicts, write_page
 from core import Mesh
 from core.normals.energy import EnergyWeights
-from core.normals.reflection import TOLERANCE, reflection_sweeps
+from core.normals.reflection import LED_SWEEPS, TOLERANCE, reflection_sweeps
 from tests import shapes
 
 TETRAHEDRON = Mesh(
@@ -47,6 +48,16 @@ def test_points_of_the_surface_come_with_the_normals_of_their_faces():
     np.testing.assert_allclose(height, 0.4 / np.sqrt(3), rtol=1e-6)
 
 
+def test_rounded_normals_are_those_of_the_vertices_and_between_them():
+    mesh = TETRAHEDRON
+    unit = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
+    middle = mesh.vertices[mesh.faces].mean(axis=1)
+    points = np.concatenate([mesh.vertices, middle])
+    expected = np.concatenate([unit, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
+    found = rounded_normals(Mesh(mesh.vertices, mesh.faces[:, [0, 2, 1]]), points)
+    np.testing.assert_allclose(np.abs(np.einsum("ni,ni->n", found, expected)), 1, atol=1e-6)
+
+
 def test_the_best_pca_is_the_best_of_those_tried(sphere):
     found = [best_pca(sphere, [k]) for k in (4, 8, 60)]
     assert best_pca(sphere, [4, 8, 60]) == max(found, key=lambda one: one["nc"])
@@ -59,9 +70,9 @@ def test_every_method_finds_the_normals_of_a_sphere(sphere):
 
 def test_turns_are_those_of_the_solver(sphere):
     turns = mean_turns(sphere.mirrors, sphere.mirrors.plane_fit(), CURVE_SWEEPS)
-    _, _, count = reflection_sweeps(sphere.points, sphere.samples.facets)
-    assert count < CURVE_SWEEPS
-    assert [turn < np.degrees(TOLERANCE) for turn in turns[:count]] == [False] * (count - 1) + [True]
+    _, _, count = reflection_sweeps(sphere.points, sphere.spacing, sphere.samples.facets)
+    ended = np.flatnonzero(np.array(turns) < np.degrees(TOLERANCE)) + 1
+    assert count == ended[ended >= LED_SWEEPS][0] < CURVE_SWEEPS
 
 
 def test_the_seven_combinations_are_the_papers():
@@ -107,6 +118,7 @@ def measured(nc: float, stage_cpu: float) -> dict:
         "closer_pca": agreement(0.97, k=4),
         **dict.fromkeys(("open3d", "adam", "printed"), agreement(0.9)),
         "error_ratio": (1 - nc) / 0.02,
+        "faceting": 0.1,
         "start_gap": 0.0,
         "distance_ratio": 1.2,
         "cleaned": None,
@@ -130,6 +142,7 @@ def measured(nc: float, stage_cpu: float) -> dict:
 def test_verdicts_follow_the_numbers():
     good, bad = (list(verdicts(measured(nc, cpu))) for nc, cpu in ((0.995, 2.0), (0.97, 4.0)))
     assert [line.startswith("**Met**") for line in good] == [True, True, True, False, False, True, True, True]
+    assert "a 1.50 (0.10)" in bad.pop(1)
     assert [line.startswith("**Met**") for line in bad] == [False, False, True, False, False, False, False, True]
     assert good[4].endswith("than the sweeps on no case.")
     assert "a (0.9700, 0.9800 at k = 7)" in bad[1]
@@ -137,7 +150,7 @@ def test_verdicts_follow_the_numbers():
 
 def test_the_page_shows_tables_and_plots(tmp_path):
     page = write_page(measured(0.995, 2.0), tmp_path).read_text(encoding="utf-8")
-    assert "| a | 0.9950 | 0.9800 | 0.9000 | 0.9000 | 0.9000 | 7 | 0.25 |" in page
+    assert "| a | 0.9950 | 0.9800 | 0.9000 | 0.9000 | 0.9000 | 7 | 0.25 | 0.10 |" in page
     assert "| 10,000 | 2.00 | 2.00 | 50% | 100 MiB |" in page
     for name in ("convergence", "growth"):
         assert f"(normals/{name}.png)" in page

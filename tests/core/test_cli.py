@@ -14,7 +14,7 @@ from core import DistanceField, Mesh, MissingDependency, Reconstruction, Setting
 from core.field.integration import NearBand
 from core.io.openvdb_module import load_openvdb
 from core.io.points import read_points
-from core.settings import options
+from core.settings import default_in_words, options
 
 ROOT = Path(__file__).parents[2]
 REPORT = {
@@ -136,7 +136,7 @@ def test_defaults_are_those_of_settings(capsys, scan, calls, tmp_path):
     assert calls[0][1] == Settings()
 
 
-REQUIRED = {"diffusion": {"integration": "poisson"}}  # by the other value of a setting
+REQUIRED = {"diffusion": {"integration": "poisson"}, "resolution": {"band": "4"}}  # by the other value of a setting
 
 
 @pytest.mark.parametrize("name", options())
@@ -242,7 +242,7 @@ def test_help(capsys, arguments):
     for name, field in options().items() if arguments[0] == "reconstruct" else ():
         assert f"--{name.replace(chr(95), chr(45))}" in text
         assert field.metadata["help"][:30] in text
-        assert f"default {field.default}" in text
+        assert f"default {default_in_words(field)}" in text
 
 
 def test_info_counts_and_measures(capsys, tmp_path):

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -57,3 +58,20 @@ def test_what_the_callback_raises_comes_through():
 
     with pytest.raises(RuntimeError, match="broken"):
         Progress(broken)(0.5)
+
+
+@given(st.integers(0, 50), st.integers(1, 20))
+def test_chunks_cover_every_row_once_and_look_before_each(count, size):
+    seen, callback = recorder()
+    rows = np.arange(count)
+    parts = [rows[part] for part in Progress(callback).part(0.5, 1.0).chunks(count, size)]
+    assert np.concatenate([rows[:0], *parts]).tolist() == rows.tolist()
+    assert all(len(part) <= size for part in parts)
+    assert len(seen) == len(parts)
+    assert all(0.5 <= fraction < 1.0 for fraction, _ in seen)
+
+
+def test_chunks_can_be_cancelled():
+    chunks = Progress(lambda fraction, _: fraction < 0.5).chunks(10, 3)
+    with pytest.raises(Cancelled):
+        list(chunks)

@@ -16,12 +16,14 @@ def case(gui):
     bpy.context.scene.vad.resolution = 48
     assert bpy.ops.vad.reconstruct() == {"FINISHED"}  # from a script: at once
     made = {obj["vad_role"]: obj for obj in bpy.context.scene.vad.result.objects}
-    bust.hide_set(True)
+    assert bust.hide_get()
+    assert {role for role, obj in made.items() if not obj.hide_get()} == {"surface"}
     with gui.override():
         bpy.ops.object.select_all(action="DESELECT")
         made["surface"].select_set(True)
         bpy.ops.view3d.view_selected()
         made["surface"].select_set(False)
+    gui.area.spaces.active.overlay.show_cursor = False  # it has some red, too
     yield 0.5
     overlay = bpy.context.scene.vad.overlay
     overlay.colour = (*LINES, 1.0)
@@ -46,6 +48,7 @@ def case(gui):
     overlay.length = 6.0
 
     # Depth-tested: behind the surface there are as many samples again.
+    made["samples"].hide_set(False)
     made["surface"].hide_set(True)
     open_view = lines("5_surface_hidden")
     assert open_view > 1.2 * shown, (open_view, shown)

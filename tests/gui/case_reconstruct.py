@@ -57,22 +57,24 @@ def case(gui):
     result = bpy.context.scene.vad.result
     assert result is not None, "the run gave no result"
     assert {obj["vad_role"] for obj in result.objects} == {"samples", "surface", "field"}
-    bust.hide_set(True)
-    yield 0.3
+    surface = next(obj for obj in result.objects if obj["vad_role"] == "surface")
+    assert bust.hide_get()
+    assert bust.hide_render
+    assert [obj for obj in result.objects if not obj.hide_get()] == [surface] == bpy.context.selected_objects
     gui.shot("5_done")
 
-    # One undo takes everything away; hiding the source was no step.
+    # One undo takes everything away and brings the source back.
     yield from gui.key("Z", ctrl=True)
     yield 0.5
     assert contents() == before, contents() ^ before
+    assert not bpy.data.objects["bust"].hide_get()
     gui.shot("6_undone")
 
     # Run again: redone, then updated in place, from the hidden source.
     with gui.override():
         bpy.ops.ed.redo()
     yield 0.5
-    bust = bpy.data.objects["bust"]
-    bust.hide_set(True)
+    assert bpy.data.objects["bust"].hide_get()
     result = bpy.context.scene.vad.result
     surface = next(obj for obj in result.objects if obj["vad_role"] == "surface")
     coarse = len(surface.data.vertices)

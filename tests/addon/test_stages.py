@@ -1,0 +1,227 @@
+"""One stage alone, and everything after the normals anew."""
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+
+@pytest.fixture
+def folder(blender, tmp_path):
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    return tmp_path
+
+
+@pytest.fixture
+def noisy(sphere):
+    """The sphere with noise of a hundredth of its radius, and a stray."""
+    points = sphere * (1 + 0.01 * np.random.default_rng(0).normal(size=(500, 1)))
+    points[7] = 3, 3, 3
+    return points
+
+
+@pytest.fixture
+def scan(blender, folder, add_mesh, noisy):
+    """Points that carry their number, off the origin and scaled; two axes are fixed by hand."""
+    obj = add_mesh("Scan", noisy)
+    obj.location, obj.scale = (10, 0, 0), (2, 2, 2)
+    obj.data.attributes.new("number", "INT", "POINT").data.foreach_set("value", np.arange(500))
+    axes = np.zeros((500, 3), np.float32)
+    axes[[3, 400]] = 0, 0, 1
+    obj.data.attributes.new("vad_axis", "FLOAT_VECTOR", "POINT").data.foreach_set("vector", axes.ravel())
+    blender.context.view_layer.update()
+    return obj
+
+
+def values(cloud, name, slot="value", width=1):
+    flat = np.empty(width * len(cloud.attributes[name].data), np.float32)
+    cloud.attributes[name].data.foreach_get(slot, flat)
+    return flat.reshape(-1, width) if width > 1 else flat
+
+
+def positions(obj):
+    return values(obj.data, "position", "vector", 3) + np.array(obj.location)
+
+
+def radii(obj):
+    return np.linalg.norm(positions(obj) - [10, 0, 0], axis=1) / 2
+
+
+def by_role(bpy):
+    return {obj["vad_role"]: obj for obj in bpy.context.scene.vad.result.objects}
+
+
+def test_cleaned_points_are_a_copy_with_all_that_they_carry(blender, scan, noisy):
+    before = values(scan.data, "position", "vector", 3)
+    assert blender.ops.vad.denoise() == {"FINISHED"}
+    made = blender.context.view_layer.objects.active
+    assert (made.name, made.type) == ("Scan cleaned", "POINTCLOUD")
+    assert_array_equal(values(scan.data, "position", "vector", 3), before)
+    assert scan.hide_get()
+    number = values(made.data, "number").astype(int)
+    assert_array_equal(number, np.delete(np.arange(500), 7))
+    assert np.abs(radii(made) - 1).mean() < 0.7 * np.abs(np.linalg.norm(noisy[number], axis=1) - 1).mean()
+    assert_allclose(
+        values(made.data, "moved"), np.linalg.norm(positions(made) - 2 * noisy[number] - [10, 0, 0], axis=1), atol=1e-5
+    )
+    held = values(made.data, "vad_axis", "vector", 3)
+    assert_array_equal(number[held.any(axis=1)], [3, 400])
+
+
+def test_strength_and_outliers_are_obeyed(blender, scan, noisy):
+    blender.ops.vad.denoise(strength=0.0, outliers=False)
+    made = blender.context.view_layer.objects.active
+    assert_allclose(positions(made), 2 * noisy + [10, 0, 0], atol=1e-5)
+
+
+def test_a_run_goes_on_from_the_cleaned_points(blender, scan):
+    blender.ops.vad.denoise()
+    blender.ops.vad.reconstruct(resolution=24, denoise="0")
+    assert blender.context.scene.vad.result.name == "Scan cleaned VAD"
+
+
+def test_normals_alone_are_those_of_a_run(blender, scan, extension):
+    assert blender.ops.vad.normals() == {"FINISHED"}
+    alone = blender.data.objects["Scan normals"]
+    assert blender.context.view_layer.objects.active == scan
+    assert not scan.hide_get()
+    blender.ops.vad.reconstruct(resolution=24)
+    samples = by_role(blender)["samples"]
+    for name, slot, width in (("normal", "vector", 3), ("confidence", "value", 1), ("number", "value", 1)):
+        assert_array_equal(values(alone.data, name, slot, width), values(samples.data, name, slot, width))
+    assert_allclose(positions(alone), positions(samples), atol=1e-6)
+
+
+def test_normals_found_again_are_updated_and_lead_back_to_the_scan(blender, scan, extension):
+    blender.ops.vad.normals()
+    alone = blender.data.objects["Scan normals"]
+    first = values(alone.data, "normal", "vector", 3)
+    scan.select_set(False)
+    blender.context.view_layer.objects.active = alone
+    blender.ops.vad.normals(solver="pca")
+    assert [obj for obj in blender.data.objects if obj.type == "POINTCLOUD"] == [alone]
+    assert np.abs(first - values(alone.data, "normal", "vector", 3)).max() > 1e-3
+    assert extension("vad_addon.points_in").sources(blender.context) == [scan]
+
+
+def test_the_stages_take_the_settings_of_the_scene(blender, scan):
+    blender.context.scene.vad.outliers = False
+    blender.context.scene.vad.denoise = "0"
+    blender.ops.vad.normals()
+    assert len(blender.data.objects["Scan normals"].data.attributes["normal"].data) == 500
+    blender.ops.vad.normals(outliers=True)
+    assert len(blender.data.objects["Scan normals"].data.attributes["normal"].data) == 499
+
+
+def test_extracting_again_gives_what_a_whole_run_gives(blender, scan):
+    blender.ops.vad.reconstruct(resolution=24, surface="both", bridge=4.0)
+    whole = {role: obj.data for role, obj in by_role(blender).items()}
+    whole = {role: values(whole[role], "position", "vector", 3) for role in ("surface", "sheet")}
+    blender.ops.vad.reconstruct(resolution=32)
+    samples = positions(by_role(blender)["samples"])
+    assert blender.ops.vad.reextract(resolution=24, surface="both", bridge=4.0) == {"FINISHED"}
+    again = by_role(blender)
+    assert_array_equal(positions(again["samples"]), samples)
+    for role, vertices in whole.items():
+        found = values(again[role].data, "position", "vector", 3)
+        assert found.shape == vertices.shape
+        assert_allclose(found, vertices, atol=1e-3)
+        assert {"distance", "confidence", "number"} <= set(again[role].data.attributes.keys())
+
+
+def test_extracting_again_searches_no_normals_and_holds_to_edited_ones(blender, scan, extension, monkeypatch):
+    blender.ops.vad.reconstruct(resolution=24)
+    samples = by_role(blender)["samples"].data
+    turned = np.roll(values(samples, "normal", "vector", 3), 1, axis=1)
+    samples.attributes["normal"].data.foreach_set("vector", turned.ravel())
+    monkeypatch.setattr(extension("core.pipeline"), "estimate_normals", None)
+    monkeypatch.setattr(extension("core.pipeline"), "clean", None)
+    blender.ops.vad.reextract(resolution=24)
+    assert_allclose(values(by_role(blender)["samples"].data, "normal", "vector", 3), turned, atol=1e-6)
+
+
+def test_extracting_again_keeps_places_materials_and_the_source(blender, scan):
+    blender.ops.vad.reconstruct(resolution=24)
+    made = by_role(blender)
+    made["surface"].location.x += 5
+    place = made["surface"].location.copy()
+    made["surface"].data.materials.append(blender.data.materials.new("Mine"))
+    made["field"].hide_set(False)
+    blender.ops.vad.reextract(resolution=24, offset=2.0)
+    assert by_role(blender) == made
+    assert made["surface"].location == place
+    assert made["surface"].data.materials[0].name == "Mine"
+    assert not made["field"].hide_get()
+    assert blender.context.scene.vad.result["vad_source"] == scan
+    assert json.loads(blender.context.scene.vad.result["vad_report"])["settings"]["offset"] == 2.0
+
+
+def test_what_is_missing_is_said(blender, scan, add):
+    with pytest.raises(RuntimeError, match="There are no results yet: reconstruct first"):
+        blender.ops.vad.reextract()
+    blender.ops.vad.reconstruct(resolution=16)
+    blender.data.objects.remove(by_role(blender)["samples"])
+    with pytest.raises(RuntimeError, match="Scan VAD has no samples any more: reconstruct again"):
+        blender.ops.vad.reextract()
+    scan.select_set(False)
+    add("Eye", blender.data.cameras.new("Eye"))
+    for operator in (blender.ops.vad.denoise, blender.ops.vad.normals):
+        with pytest.raises(RuntimeError, match=r"Eye \(camera\) holds no points"):
+            operator()
+
+
+@pytest.mark.parametrize("operator", ["denoise", "normals"])
+def test_too_few_points_are_refused_and_leave_nothing(blender, add_mesh, sphere, operator):
+    add_mesh("Few", sphere[:3])
+    with pytest.raises(RuntimeError, match="3 distinct finite points") as caught:
+        getattr(blender.ops.vad, operator)()
+    assert "Traceback" not in str(caught.value)
+    assert len(blender.data.objects) == 1
+
+
+@pytest.mark.parametrize(
+    ("operator", "more"), [("denoise", {}), ("normals", {}), ("reextract", dict(surface="both", resolution=16))]
+)
+def test_each_is_one_undo_step(blender, scan, operator, more):
+    blender.ops.vad.reconstruct(resolution=16)
+    blender.ops.ed.undo_push(message="before")
+
+    def state():
+        return {(obj.name, obj.hide_get(), obj.data.name) for obj in blender.data.objects}
+
+    before = state()
+    assert getattr(blender.ops.vad, operator)("EXEC_DEFAULT", True, **more) == {"FINISHED"}
+    assert state() != before
+    blender.ops.ed.undo()
+    assert state() == before
+
+
+@pytest.mark.parametrize("until", ["cleaning", "normals"])
+def test_the_worker_finds_the_same(extension, sphere, tmp_path, until):
+    outcome, job = extension("vad_addon.outcome"), extension("vad_addon.job")
+    axes = np.array([3, 70]), np.array([[0.0, 0, 1], [1, 0, 0]])
+    task = outcome.Task(sphere, extension("core.settings").Settings(denoise=1.0), axes, until=until)
+    running = job.Job(task, tmp_path)
+    try:
+        running._process.wait(60)
+        assert running.poll()
+        found = running.outcome()
+    finally:
+        running.stop()
+    expected = outcome.compute(task, tmp_path)
+    for name in ("points", "source_index", "normals", "confidence", "origin", "cell", "shape"):
+        assert_array_equal(getattr(found, name), getattr(expected, name))
+    assert (found.normals is None) == (until == "cleaning")
+    assert found.surface is found.sheet is found.volume is None
+
+
+def test_a_task_reaches_the_worker_whole(extension, sphere, tmp_path):
+    outcome = extension("vad_addon.outcome")
+    settings = extension("core.settings").Settings(resolution=20)
+    task = outcome.Task(sphere, settings, known=(sphere, np.ones(500)), origin=np.array([1.0, 2, 3]))
+    task.save(tmp_path / "task.npz")
+    loaded = outcome.Task.load(tmp_path / "task.npz")
+    assert (loaded.settings, loaded.until, loaded.constraints) == (settings, "all", None)
+    assert_array_equal(loaded.known[0], sphere)
+    assert_array_equal(loaded.origin, [1, 2, 3])

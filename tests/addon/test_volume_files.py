@@ -1,0 +1,111 @@
+"""Volumes that nothing can read any more do not pile up; every other one stays."""
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def files(blender, extension):
+    module = extension("vad_addon.volume_files")
+    module._made.clear()
+    return module
+
+
+@pytest.fixture
+def folder(blender, tmp_path):
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    return tmp_path
+
+
+@pytest.fixture
+def run(blender, files, folder, add_mesh, sphere):
+    """Function: run once more."""
+    add_mesh("Scan", sphere)
+    return lambda: blender.ops.vad.reconstruct(resolution=16)
+
+
+def names(folder):
+    return sorted(path.name for path in (folder / "vad").glob("*.vdb"))
+
+
+def test_all_stay_while_undo_may_bring_them_back(blender, run, folder):
+    for _ in range(3):
+        run()
+    blender.ops.wm.save_mainfile()
+    assert names(folder) == ["Scan.vdb", "Scan_001.vdb", "Scan_002.vdb"]
+
+
+def test_with_another_file_go_those_that_no_saved_file_reads(blender, run, folder):
+    run()
+    run()
+    blender.ops.wm.save_mainfile()
+    run()
+    run()
+    blender.ops.wm.read_homefile(use_empty=True)
+    assert names(folder) == ["Scan_001.vdb"]
+    blender.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
+    assert blender.data.volumes["Scan field"].grids.load()
+
+
+def test_what_an_earlier_save_reads_stays(blender, run, folder):
+    run()
+    blender.ops.wm.save_as_mainfile(filepath=str(folder / "first.blend"), copy=True)
+    run()
+    blender.ops.wm.save_as_mainfile(filepath=str(folder / "second.blend"))
+    run()
+    blender.ops.wm.read_homefile(use_empty=True)
+    assert names(folder) == ["Scan.vdb", "Scan_001.vdb"]
+
+
+def test_files_of_other_sessions_are_never_touched(blender, run, folder, files):
+    (folder / "vad").mkdir()
+    (folder / "vad" / "Scan.vdb").write_bytes(b"of somebody else")
+    run()
+    blender.ops.wm.read_homefile(use_empty=True)
+    assert names(folder) == ["Scan.vdb"]
+
+
+END_OF_A_SESSION = """
+    import importlib, sys, types
+    import bpy
+
+    package = types.ModuleType("vad_extension")
+    package.__path__ = [sys.argv[1]]
+    sys.modules["vad_extension"] = package
+    vad_addon = importlib.import_module("vad_extension.vad_addon")
+    vad_addon.register()
+    files = importlib.import_module("vad_extension.vad_addon.volume_files")
+    bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+    files._QUITTING = float(sys.argv[3])
+    for name in ("saved", "updated", "shown"):
+        temporary = bpy.app.tempdir + name
+        open(temporary, "w").close()
+        path = files.adopt(name, temporary)
+        if name == "updated":
+            continue
+        bpy.data.volumes.new(name).filepath = str(path)
+        if name == "saved":
+            bpy.ops.wm.save_mainfile()
+            bpy.data.volumes.remove(bpy.data.volumes[name])
+    vad_addon.unregister()
+"""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "left"), [(20, ["saved.vdb", "shown.vdb"]), (-1, ["saved.vdb", "shown.vdb", "updated.vdb"])]
+)
+def test_at_the_end_go_those_that_neither_a_saved_nor_the_open_file_reads(bpy, tmp_path, seconds, left):
+    blend = str(tmp_path / "scene.blend")
+    ran = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(END_OF_A_SESSION), str(ROOT), blend, str(seconds)],
+        capture_output=True,
+        text=True,
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert set(names(tmp_path)) == {"saved.vdb", "shown.vdb"} | left

@@ -1,0 +1,148 @@
+"""The measures behind docs/noise.md on shapes whose truth is known, and the page on made-up numbers."""
+
+import json
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("igl")
+
+from benchmarks import noise_hostile, noise_measure
+from benchmarks.cases import Case
+from benchmarks.metrics import surface_errors
+from benchmarks.noise import CASES, SHAPE, main, verdicts, write_page
+from benchmarks.noise_hostile import FILES, POINTS, tried
+from benchmarks.noise_measure import MARGIN, NOISE, STRAYS, measure_strays, noisy, strewn
+from benchmarks.noise_silence import silences
+from core import Mesh, Settings
+from tests import shapes
+
+SQUARE = Mesh(np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+
+
+def crossed(mesh):
+    """The mesh and the same upright."""
+    vertices = np.vstack([mesh.vertices, mesh.vertices[:, [2, 0, 1]]])
+    return Mesh(vertices, np.vstack([mesh.faces, mesh.faces + len(mesh.vertices)]))
+
+
+@pytest.fixture
+def square():
+    points = shapes.square(400)
+    return Case("square", points, np.tile([0.0, 0, 1], (400, 1)), SQUARE, np.empty((0, 3)), {"category": "open"})
+
+
+def test_noise_has_the_deviation_asked_for(square):
+    off = noisy(square, 2.0) - square.points
+    assert off.std() == pytest.approx(0.02 * np.ptp(square.points, axis=0).max(), rel=0.1)
+    np.testing.assert_array_equal(noisy(square, 0.0), square.points)
+
+
+def test_strays_follow_the_points_and_fill_the_box(square):
+    points = strewn(square, 0.5)
+    np.testing.assert_array_equal(points[:400], square.points)
+    strays = points[400:]
+    assert len(strays) == 200
+    assert 0.9 < np.abs(strays[:, :2]).max() <= MARGIN
+    assert len(strewn(square, 0.0)) == 400
+
+
+def test_strays_found_and_points_lost_are_told_apart(square, monkeypatch):
+    monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
+    monkeypatch.setattr(noise_measure, "Settings", partial(Settings, resolution=32))
+    upright = square.points[:, [2, 0, 1]]
+    crossing = replace(square, points=np.vstack([square.points, upright]), truth=crossed(SQUARE))
+    found = measure_strays(crossing, 0.05)
+    assert found["found"] > 0.8
+    assert found["lost"] < 0.05
+    assert found["cd"] < found["untreated_cd"]
+    clean = measure_strays(crossing, 0.0)
+    assert clean["found"] is None
+    assert clean["cd"] == clean["untreated_cd"] < 20
+
+
+def test_silences_count_every_look():
+    stages = silences(shapes.sphere(300), Settings(resolution=16, surface="none"))
+    assert {"cleaning", "normals", "distance field"} <= set(stages)
+    assert all(found["looks"] >= 1 and found["seconds"] > 0 for found in stages.values())
+
+
+def test_bad_input_is_tried_and_what_breaks_is_told(monkeypatch):
+    monkeypatch.setattr(noise_hostile, "POINTS", {name: POINTS[name] for name in ("3 points", "4 points")})
+    monkeypatch.setattr(noise_hostile, "FILES", {name: FILES[name] for name in ("empty .xyz", ".csv of words")})
+    rows = {row["given"]: row for row in tried()}
+    assert {name: row["outcome"] for name, row in rows.items()} == {
+        "3 points": "refused", "4 points": "done", "empty .xyz": "refused", ".csv of words": "refused"
+    }  # fmt: skip
+    assert rows["empty .xyz"]["got"] == "scan.xyz is empty"
+
+    def broken(*_):
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(noise_hostile, "reconstruct", broken)
+    assert [row["outcome"] for row in tried()] == ["crashed", "crashed", "refused", "refused"]
+
+
+def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2):
+    way = {"after": 1.0, "nc": nc, "cd": cd, "hd": 10.0, "cpu": 2.0}
+    rows = [
+        {
+            "case": case, "points": 100, "percent": percent, "deviation": 4.0, "before": 3.5,
+            "pca": {"nc": 0.98, "k": 12},
+            "ours": {**way, "noise": 3.9, "neighbours": [20, 30, 40]},
+            "alternating": {**way, "after": 2.0, "changes": [0.4, 0.2]},
+            "poisson": {"nc": 0.9, "cd": 1.5, "hd": 60.0, "cpu": 1.0},
+        }
+        for case in CASES
+        for percent in NOISE
+    ]  # fmt: skip
+    strays = [
+        {"case": case, "share": share, "found": 0.99 if share else None, "lost": 0.001, "cd": 0.1 + share, "hd": 9.0,
+         "untreated_cd": 5.0, "pieces": 2}
+        for case in CASES
+        for share in STRAYS
+    ]  # fmt: skip
+    return {
+        "versions": {"Python": "3.11"},
+        "hostile": [{"given": "junk", "outcome": outcome, "got": "a|b\x07" + 300 * "c", "seconds": 0.1}],
+        "fuzz": {"runs": 3, "done": 2, "refused": 1, "crashed": 0, "not finite": 0, "hung": 0, "seconds": 1.0},
+        "strays": strays,
+        "silences": {"clean": {"cleaning": {"looks": 3, "seconds": 0.4, "cpu": silence}}},
+        "noise": rows,
+        "categories": dict.fromkeys(CASES, "closed"),
+    }
+
+
+def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
+    measured = made_up()
+    page = write_page(measured, tmp_path).read_text()
+    for case in CASES:
+        assert page.count(f"| {case} |") == 3 * len(NOISE) + len(STRAYS)
+    assert "| junk | refused | a·b·ccc" in page
+    assert "c …" in page
+    assert (tmp_path / "noise" / "noise.png").stat().st_size > 10_000
+    assert json.loads((tmp_path / "noise" / "numbers.json").read_text())["fuzz"] == measured["fuzz"]
+
+
+@pytest.mark.parametrize(
+    ("change", "missed"),
+    [
+        ({}, ["with 5 % of strays"]),
+        ({"nc": 0.98}, [f"{SHAPE} at 0.5 %: NC", "with 5 % of strays"]),
+        ({"cd": 1.0}, [f"{SHAPE} at 0.5 %: CD", "with 5 % of strays"]),
+        ({"outcome": "hung"}, ["with 5 % of strays", "of 1 bad inputs"]),
+        ({"silence": 1.5}, ["with 5 % of strays", "the longest work"]),
+    ],
+)
+def test_verdicts_follow_the_numbers(change, missed):
+    lines = [line for line in verdicts(made_up(**change)) if line.startswith("**Missed**")]
+    assert len(lines) == len(missed)
+    assert all(any(part in line for line in lines) for part in missed)
+
+
+def test_an_empty_folder_is_refused_in_a_line(tmp_path, capsys):
+    assert main([str(tmp_path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

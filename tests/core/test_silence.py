@@ -1,0 +1,58 @@
+"""No stage works through more than so many samples without a look at the progress callback, however many there are;
+and what it finds does not depend on where it looks up."""
+
+import numpy as np
+import pytest
+
+from core import points as core_points
+from core.cleaning import outliers, quadrics
+from core.cleaning.positions import denoise
+from core.field import borders, curvature, local_surface
+from core.points import local_spacing
+from tests import shapes
+
+N, CHUNK = 600, 100
+POINTS = shapes.scattered_sphere(N)
+SPACING = local_spacing(POINTS)
+DIRTY = np.vstack([POINTS, np.random.default_rng(0).uniform(-2, 2, (N // 5, 3))])
+NOISY = POINTS + np.random.default_rng(0).normal(size=POINTS.shape) * 0.03
+
+
+def patches(progress):
+    fitted = local_surface.fit_local_surface(POINTS, POINTS, np.ones(N), SPACING, 3.0, progress)
+    return fitted.bend, *(getattr(fitted.rims, name) for name in borders.Rims.__dataclass_fields__)
+
+
+STAGES = {
+    "spacing": ([(core_points, "_CHUNK", CHUNK)], lambda progress: (local_spacing(POINTS, progress),), 1),
+    "outliers": (
+        [(outliers, "_CHUNK", CHUNK), (quadrics, "_CHUNK", CHUNK * 20)],
+        lambda progress: (outliers.find_outliers(DIRTY, progress),),
+        3,
+    ),
+    "denoising": (
+        [(quadrics, "_CHUNK", CHUNK * 50)],
+        lambda progress: (denoise(NOISY, SPACING, 1.0, progress=progress)[0],),
+        4,
+    ),
+    "patches": (
+        [(curvature, "_CHUNK", CHUNK), (borders, "_CHUNK", CHUNK), (local_surface, "_CHUNK", CHUNK)],
+        patches,
+        3,
+    ),
+}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_looks_grow_with_the_samples_and_change_nothing(stage, monkeypatch):
+    chunks, run, passes = STAGES[stage]
+    whole = run(None)
+    for module, name, size in chunks:
+        monkeypatch.setattr(module, name, size)
+    looks = []
+    parts = run(lambda fraction, text: looks.append(fraction))
+    assert len(looks) >= passes * N // CHUNK
+    assert looks == sorted(looks)
+    assert 0 <= looks[0] <= looks[-1] <= 1
+    for expected, found in zip(whole, parts, strict=True):
+        np.testing.assert_array_equal(found, expected)

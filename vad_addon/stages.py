@@ -1,0 +1,168 @@
+"""Operators that do one stage of a run alone: cleaned points, normals, or everything after the normals anew."""
+
+import json
+
+import bpy
+import numpy as np
+
+from ..core.settings import options
+from . import attributes, datablocks, extras, overlay, points_in, results, run
+from .attributes import Attribute
+from .delivery import OWN, deliver
+from .operators import report_run
+from .outcome import CLEANING, NORMALS, Task
+from .points_in import AXIS, Source
+from .properties import setting_property, settings_from, taken_over
+
+
+class VAD_OT_denoise(run.Run, bpy.types.Operator):
+    """Make a copy of the points without strays, moved onto the smooth surface that neighbours share. The selected
+    objects are hidden and stay as they are"""
+
+    bl_idname = "vad.denoise"
+    bl_label = "Clean Points"
+    bl_options = {"REGISTER", "UNDO"}
+
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="How far points are moved: not at all (0) to all the way (1)",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+    )
+    outliers: bpy.props.BoolProperty(
+        name="Outliers", description="Drop stray points far from any surface", default=True
+    )
+
+    def instant(self, task):
+        return len(task.points) <= 3000
+
+    def prepare(self, context):
+        self._objects, self._source = _selected(context)
+        settings = settings_from(context.scene.vad, denoise=self.strength, outliers=self.outliers)
+        return Task(self._source.points, settings, until=CLEANING)
+
+    def deliver(self, context, scene, found):
+        source, rows = self._source, found.source_index
+        moved = np.linalg.norm(found.points - source.points[rows], axis=1)
+        carried = {name: attribute[rows] for name, attribute in source.attributes.items()}
+        carried |= dict(moved=Attribute.of(moved), radius=_radius(found))
+        if source.constraints:
+            axes = np.zeros_like(source.points)
+            axes[source.constraints[0]] = source.constraints[1]
+            carried[AXIS] = Attribute.of(axes[rows])
+        cloud = datablocks.pointcloud_data(f"{source.name} cleaned", found.points, found.origin, carried)
+        obj = _placed(scene, source, cloud, found.origin)
+        results.take_the_stage(context, obj, self._objects)
+        dropped = json.loads(found.report)["cleaning"]["outliers"]
+        facts = f"{len(rows):,} points, {dropped:,} strays dropped, moved by {moved.mean():.3g} on average"
+        self.report({"INFO"}, f"{obj.name}: {facts}")
+
+
+class VAD_OT_normals(run.Run, bpy.types.Operator):
+    """Find the normals alone and show them, without a field or a mesh. Pressed again, it updates them"""
+
+    bl_idname = "vad.normals"
+    bl_label = "Find Normals"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        name: setting_property(options()[name], options={"SKIP_SAVE"}) for name in ("solver", "outliers", "denoise")
+    }
+
+    def instant(self, task):
+        return len(task.points) <= 10_000 and self.solver != "energy"
+
+    def prepare(self, context):
+        _, self._source = _selected(context)
+        stored = context.scene.vad
+        settings = settings_from(stored, **taken_over(stored, self.properties, self.__annotations__))
+        return Task(self._source.points, settings, self._source.constraints, until=NORMALS)
+
+    def deliver(self, context, scene, found):
+        source = self._source
+        carried = {name: value[found.source_index] for name, value in source.attributes.items() if name not in OWN}
+        carried |= dict(normal=Attribute.of(found.normals), confidence=Attribute.of(found.confidence))
+        carried["radius"] = _radius(found)
+        cloud = datablocks.pointcloud_data(f"{source.name} normals", found.points, found.origin, carried)
+        origin = points_in.object_of(source)
+        obj = results.estimate(scene, origin)
+        if obj is None:
+            obj = _placed(scene, source, cloud, found.origin)
+            obj[results.ROLE], obj[results.SOURCE] = results.ESTIMATE, origin
+        else:
+            datablocks.replace_data(obj.data, cloud)
+            obj.location = found.origin
+        if not bpy.app.background:
+            scene.vad.overlay.show = True
+        for warning in found.warnings:
+            self.report({"WARNING"}, warning)
+        unsure = int((found.confidence < 0.5).sum())
+        self.report({"INFO"}, f"{obj.name}: {len(found.points):,} normals, {unsure:,} of them unsure")
+
+
+class VAD_OT_reextract(run.Run, bpy.types.Operator):
+    """Make field and meshes of the last run anew with other settings, from the normals it found"""
+
+    bl_idname = "vad.reextract"
+    bl_label = "Extract Again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        name: setting_property(options()[name], options={"SKIP_SAVE"})
+        for name in ("surface", "bridge", "offset", "resolution")
+    }
+
+    @classmethod
+    def problem(cls, context):
+        collection = extras.chosen_result(context)
+        if collection is None:
+            return "There are no results yet: reconstruct first"
+        if results.member(collection, results.SAMPLES) is None:
+            return f"{collection.name} has no samples any more: reconstruct again"
+        return ""
+
+    def instant(self, task):
+        return len(task.points) <= 20_000 and task.settings.resolution <= 64
+
+    def prepare(self, context):
+        stored = context.scene.vad
+        settings = settings_from(stored, **taken_over(stored, self.properties, self.__annotations__))
+        collection = extras.chosen_result(context)
+        samples = results.member(collection, results.SAMPLES)
+        near, axes, confidence, _ = overlay.samples_of(samples.data)
+        centre = np.array(samples[results.ORIGIN])
+        points = near.astype(np.float64) + centre
+        made_from = collection.get(results.SOURCE)
+        name, uid = (made_from.name, made_from.session_uid) if made_from else (samples.name.removesuffix(" samples"), 0)
+        self._source = Source(name, uid, points, attributes.read(samples.data), None)
+        self._collection = collection.session_uid
+        return Task(points, settings, known=(axes, confidence), origin=centre)
+
+    def deliver(self, context, scene, found):
+        of_scene = scene.collection.children_recursive
+        collection = next((one for one in of_scene if one.session_uid == self._collection), None)
+        report_run(self, deliver(scene, self._source, found, collection=collection))
+
+
+def _selected(context):
+    """What is selected: the objects' `session_uid`, and their points."""
+    objects = points_in.sources(context)
+    return [obj.session_uid for obj in objects], points_in.gather(objects, context, context.scene.vad.selected_only)
+
+
+def _placed(scene, source, data, origin):
+    """A new object, beside the one that its points come from."""
+    obj = bpy.data.objects.new(data.name, data)
+    obj.location = origin
+    beside = points_in.object_of(source)
+    homes = beside.users_collection if beside and beside.name in scene.objects else ()
+    (homes[0] if homes else scene.collection).objects.link(obj)
+    return obj
+
+
+def _radius(found):
+    return Attribute.of(np.full(len(found.points), 0.25 * found.cell))
+
+
+CLASSES = VAD_OT_denoise, VAD_OT_normals, VAD_OT_reextract
