@@ -38,7 +38,7 @@ bench: $(PEERS_READY) ## compare with other ways on a few shapes (minutes); CASE
 	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH)-quick --quick)
 	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)-quick) --peer --save build/results $(ARGS)
 
-bench-full: $(PEERS_READY) ## the same on all shapes and samplings, timed three times, into docs/bench.md (about 2 hours)
+bench-full: $(PEERS_READY) ## the same on all shapes and samplings, timed three times, into docs/bench.md (hours)
 	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH))
 	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)) --results --page bench --repeats 3
 

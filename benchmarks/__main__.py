@@ -13,8 +13,8 @@ from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 from core.settings import options
 
-from .against import peer_tables
-from .cases import find_cases, has_sampling
+from .against import peer_tables, verdicts
+from .cases import SAMPLINGS, find_cases, has_sampling
 from .peers import check_open3d, peer_libraries
 from .report import comparison, markdown_tables, read_run, terminal_header, terminal_row
 from .results import write_results
@@ -53,9 +53,9 @@ def _parser():
     parser.add_argument("--save", metavar="NAME", type=Path, help="write NAME.json and NAME.md")
     parser.add_argument("--compare", metavar="JSON", type=Path, help="say what changed since a saved run")
     parser.add_argument(
-        "--results", action="store_true", help="run everything, both samplings, with the peers; write docs/results.md"
+        "--results", action="store_true", help="run everything, all samplings, with the peers; write docs/results.md"
     )
-    parser.add_argument("--page", metavar="NAME", default="results", help="with --results: write docs/NAME.md instead")
+    parser.add_argument("--page", metavar="NAME", help="with --results: write docs/NAME.md instead")
     return parser
 
 
@@ -83,14 +83,19 @@ def _benchmark(given):
     if given.results:
         if chosen or given.cases or given.blue_noise or given.save or given.compare:
             raise SettingsError("--results covers all cases at the default settings; drop the other options")
-        runs = {sampling: _run(given, sampling, settings, True) for sampling in ("uniform", "blue noise")}
-        print(f"wrote {write_results(runs, given.page)}")
+        paths = find_cases(given.folder)
+        samplings = [sampling for sampling in SAMPLINGS if any(has_sampling(path, sampling) for path in paths)]
+        runs = {sampling: _run(given, sampling, settings, True) for sampling in samplings}
+        print(f"wrote {write_results(runs, given.page or 'results')}")
         return _status(*runs.values())
+    if given.page:
+        raise SettingsError("--page names the page that --results writes; add that or drop this")
 
     earlier = read_run(given.compare) if given.compare else None
     if given.save:
         writable_folder(given.save.parent)
     run = _run(given, "blue noise" if given.blue_noise else "uniform", settings, given.peer)
+    print("".join(f"{line}\n" for line in verdicts(run["cases"])), end="")
     if given.save:
         _save(run, given.save)
     if earlier:

@@ -37,8 +37,8 @@ def best_peer(result: dict) -> str | None:
 
 
 def compared(results: list[dict]) -> list[dict]:
-    """The results that can be compared: of cases that worked for us and at least one peer."""
-    return [result for result in results if "error" not in result and "peers" in result and best_peer(result)]
+    """The results that can be compared: with our closed surface and that of at least one peer."""
+    return [result for result in results if "mesh" in result and "peers" in result and best_peer(result)]
 
 
 def verdicts(results: list[dict]) -> Iterator[str]:

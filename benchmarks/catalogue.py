@@ -12,7 +12,7 @@ from core import Mesh
 from core.io.atomic import atomic_path
 
 from .sampling import blue_noise, graded, pierced, uniform, wires
-from .shapes import closed, junctions, one_sided, open, rooms
+from .shapes import bordered, closed, junctions, one_sided, rooms
 from .shapes.surface import Surface, from_mesh
 
 _MASK = Path(__file__).resolve().parent.parent / "tests" / "data" / "mask_truth.ply"
@@ -55,12 +55,12 @@ CASES = {
     "bumps_10k": Recipe("watertight", closed.bumps, 10_000, quick=True),
     "knot_10k": Recipe("watertight", closed.knot, 10_000),
     "bumps_100k": Recipe("watertight", closed.bumps, 100_000),
-    "hemisphere_2k": Recipe("open", open.hemisphere, 2_000),
+    "hemisphere_2k": Recipe("open", bordered.hemisphere, 2_000),
     "mask_5k": Recipe("open", bundled_mask, 5_000),
-    "cloth_10k": Recipe("open", open.cloth, 10_000, quick=True),
-    "petals_10k": Recipe("open", open.petals, 10_000),
-    "spiral_5k": Recipe("open", open.spiral, 5_000),
-    "relief_20k": Recipe("open", open.relief, 20_000),
+    "cloth_10k": Recipe("open", bordered.cloth, 10_000, quick=True),
+    "petals_10k": Recipe("open", bordered.petals, 10_000),
+    "spiral_5k": Recipe("open", bordered.spiral, 5_000),
+    "relief_20k": Recipe("open", bordered.relief, 20_000),
     "paperplane_1k": Recipe("non-manifold", junctions.paper_plane, 1_000),
     "strawberry_1k": Recipe("non-manifold", junctions.strawberry, 1_000),
     "fish_3k": Recipe("non-manifold", junctions.fish, 3_000),
@@ -76,16 +76,16 @@ CASES = {
     "room_150k": Recipe("indoor scene", rooms.room, 150_000),
     "torus_100": Recipe("sparse", closed.torus, 100),
     "bumps_300": Recipe("sparse", closed.bumps, 300, quick=True),
-    "petals_1000": Recipe("sparse", open.petals, 1_000),
+    "petals_1000": Recipe("sparse", bordered.petals, 1_000),
     "knot_graded_10k": Recipe("varying density", closed.knot, 10_000, graded),
-    "cloth_graded_10k": Recipe("varying density", open.cloth, 10_000, graded),
+    "cloth_graded_10k": Recipe("varying density", bordered.cloth, 10_000, graded),
     "torus_wires_3k": Recipe("wireframe", closed.torus, 3_000, wires),
     "bumps_holes_10k": Recipe("holes", closed.bumps, 10_000, pierced),
     "bumps_noise0.5_10k": Recipe("noisy", closed.bumps, 10_000, noise=0.5, quick=True),
-    "cloth_noise0.5_10k": Recipe("noisy", open.cloth, 10_000, noise=0.5),
+    "cloth_noise0.5_10k": Recipe("noisy", bordered.cloth, 10_000, noise=0.5),
     "knot_noise1_10k": Recipe("noisy", closed.knot, 10_000, noise=1.0),
     "torus_strays_5k": Recipe("outliers", closed.torus, 5_000, strays=0.05),
-    "cloth_strays_10k": Recipe("outliers", open.cloth, 10_000, strays=0.05),
+    "cloth_strays_10k": Recipe("outliers", bordered.cloth, 10_000, strays=0.05),
 }
 
 

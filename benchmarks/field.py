@@ -63,7 +63,8 @@ the nodes themselves all compare alike.
 
 ## With and without diffusion, by the number of points
 
-Points of the true surfaces of {closed} and {open}, uniform by area.
+Points of the true surfaces of {closed} and {open}, uniform by area. Where the points are denser than the nodes, ours
+is held up by the grid, which the distances read straight off the points are not.
 
 ![error at nodes near the surface over the number of points](field/densities.png)
 
@@ -126,9 +127,9 @@ points on a box of 128 cells make sqrt(t) about half a cell and leave much of th
 
 Seconds on {closed}, points uniform by area; *normals*: facets and sweeps; *field*: patches, diffusion and integration
 in the whole box, by default. *published*: the paper's table, **on other hardware** (Core i9-10900, RTX 4090) and other
-shapes, so the ratio says how the methods' costs compare in magnitude and no more. Ours ran in a process of its own for
-every row, on two cores that other work shared; by the clock / in CPU seconds. The paper's grid is a cube of the
-resolution given, ours has this many cells along the longest side.
+shapes, so the ratio says how the methods' costs compare in magnitude and no more. Ours: by the clock / CPU seconds of
+all threads, a process of its own for every row, on two cores that much other work shared, so only the latter count.
+The paper's grid is a cube of the resolution given, ours has this many cells along the longest side.
 
 ### Normals
 
@@ -229,8 +230,7 @@ def write_plots(numbers: dict, pictures: dict, folder: Path) -> None:
         plot_offsets(folder / f"offsets_{name}.png", pictures["offsets"][case], UP[case])
     cuts = pictures["densities"]
     plot_density_cuts(folder / "density_cuts.png", cuts, cuts["nodes"], cuts["axis"], cuts["up"], SLICED)
-    ways = {way: title for way, title in tables.DENSITY_WAYS.items() if way != "exact"}
-    plot_densities(folder / "densities.png", numbers["densities"], ways)
+    plot_densities(folder / "densities.png", numbers["densities"], tables.DENSITY_WAYS)
 
 
 def _quality(sampling: str, results: list[dict]) -> str:

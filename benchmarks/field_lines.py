@@ -31,11 +31,9 @@ def _line(shape: Revolved, start, end):
     u, true = field.sample(x), shape.distance(x)
     nodes = cut_nodes(field, 1, start[1])
     seen, exact = field.sample(nodes.reshape(-1, 3)), shape.distance(nodes.reshape(-1, 3))
+    curves = {"place": share * np.linalg.norm(end - start), "u": u, "d": true, "nearest": nearest_sample(points, x)}
     numbers = {
-        "place": share * np.linalg.norm(end - start),
-        "u": u,
-        "d": true,
-        "nearest": nearest_sample(points, x),
+        **{name: np.round(curve, 6) for name, curve in curves.items()},
         "cell": field.spacing,
         "line": _off(u, true),
         "plane": _off(seen, exact),

@@ -21,7 +21,6 @@ DENSITY_WAYS = {
     "projection": "no diffusion",
     "nearest": "nearest sample",
     "planes": "PCA planes",
-    "exact": "exact nodes",
 }
 BORDERS = {"none": "none", "discs": "discs", "bracket": "bracket", "kept": "rims", "poisson": "Poisson"}
 
@@ -36,9 +35,9 @@ def densities(rows: list[dict]) -> str:
     lines = []
     for row in rows:
         found = [row[way] for way in DENSITY_WAYS]
-        errors = [" / ".join(f"{one[where]:.2f}" for where in ("near", "nodes", "box")) for one in found]
+        errors = [" / ".join(f"{one[where]:.2f}" for where in ("nodes", "box")) for one in found]
         lines.append([row["case"], f"{row['points']:,}", *errors])
-    return "Near / at nodes / in the box:\n\n" + _table(["shape", "points", *DENSITY_WAYS.values()], lines)
+    return "At nodes near the surface / in the box:\n\n" + _table(["shape", "points", *DENSITY_WAYS.values()], lines)
 
 
 def offsets(shapes: list[dict]) -> str:
@@ -105,7 +104,7 @@ def normal_cost(rows: list[dict]) -> str:
     for points, published in PUBLISHED_NORMALS.items():
         best = min((row["normals"] for row in rows if row["points"] == points), key=lambda clock: clock["cpu"])
         lines.append([f"{points:,}", f"{best['seconds']:.2f} / {best['cpu']:.2f}", *_beside(best, published)])
-    return _table(["points", "ours", "published", "published / ours"], lines)
+    return _table(["points", "ours", "published", "published / our CPU time"], lines)
 
 
 def field_cost(rows: list[dict]) -> str:
@@ -119,11 +118,11 @@ def field_cost(rows: list[dict]) -> str:
         ]
         for row in rows
     ]
-    return _table(["points", "resolution", "ours", "published", "published / ours", "our peak memory"], lines)
+    return _table(["points", "resolution", "ours", "published", "published / our CPU time", "our peak memory"], lines)
 
 
 def _beside(clock, published):
-    return [ABSENT, ABSENT] if published is None else [f"{published:.2f}", f"{published / clock['seconds']:.1f}"]
+    return [ABSENT, ABSENT] if published is None else [f"{published:.2f}", f"{published / clock['cpu']:.1f}"]
 
 
 def _ratio(found):

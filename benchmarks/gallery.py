@@ -15,7 +15,7 @@ from core.normals.pca import pca_normals
 
 from .pictures import View, caption, draw_errors, draw_points, draw_surface, error_scale, save, sheet
 from .sampling import blue_noise, pierced, uniform, wires
-from .shapes import closed, junctions, one_sided, open
+from .shapes import bordered, closed, junctions, one_sided
 from .status import DONE, exit_status
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "gallery"
@@ -26,7 +26,7 @@ _PCA_NEIGHBOURS = 12
 def shapes(path: Path) -> Path:
     """README: five kinds of surface, the points above and what comes of them below, cut open."""
     shown = [
-        ("cloth, open", open.cloth, 10_000, View((-0.6, -1.0, 0.9))),
+        ("cloth, open", bordered.cloth, 10_000, View((-0.6, -1.0, 0.9))),
         ("roll, sheets that meet", junctions.toilet_paper, 10_000, View((-0.5, -0.9, 0.9))),
         ("sweet, cut in half", junctions.candy, 10_000, View((-0.35, -1.0, 0.45), 1, 0.0)),
         ("Boy's surface, one side, cut", one_sided.boy, 10_000, View((-0.6, -1.0, 0.5), 1, -0.05)),
@@ -89,7 +89,7 @@ def gaps(path: Path) -> Path:
 
 
 def limits(path: Path) -> Path:
-    """Where the defaults fail: too few points, sheets closer than the points on them, heavy noise, few points at junctions."""
+    """Where the defaults fail: too few points, sheets too close, heavy noise, few points at junctions."""
     rng = np.random.default_rng(0)
     knot, _ = uniform(closed.knot(), 10_000, rng)
     close, (fruit, _) = _two_sheets(rng), blue_noise(junctions.strawberry(), 1_000, rng)

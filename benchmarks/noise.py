@@ -15,9 +15,20 @@ from core.cleaning.positions import LONGEST_MOVE
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 
-from .cases import find_cases, load_case
+from .cases import SAMPLINGS, SPOILED, Case, find_cases, has_sampling, load_case
 from .noise_hostile import RESOLUTION, fuzzed, tried
-from .noise_measure import JET_NEIGHBOURS, NOISE, PCA_NEIGHBOURS, STRAYS, measure_noise, measure_strays
+from .noise_measure import (
+    HALF_NOISE,
+    JET_NEIGHBOURS,
+    NOISE,
+    PCA_NEIGHBOURS,
+    STRAYS,
+    measure_half,
+    measure_noise,
+    measure_strays,
+    measure_wires,
+    share_noisy,
+)
 from .noise_plots import picture, plot_noise
 from .noise_silence import silences
 from .peers import check_open3d
@@ -36,8 +47,9 @@ _PAGE = """\
 # Noise, strays, bad input
 
 Made by `python -m benchmarks.noise FOLDER`, which writes this page, its pictures and the numbers behind it
-([numbers.json](noise/numbers.json)); do not edit it by hand. {versions}. Every row is one run with default settings
-unless said otherwise, nothing is chosen per shape or per row. Distances × 10³, the longest side of a true shape is 0.8.
+([numbers.json](noise/numbers.json)); do not edit it by hand. {versions}.
+Every row is one run with default settings unless said otherwise, nothing is chosen per shape or per row. Distances ×
+10³, the longest side of a true shape is 0.8.
 
 ## What is met and what is not
 
@@ -56,8 +68,8 @@ Gaussian noise in every coordinate, its standard deviation in per cent of the lo
   average below {settled} (at most {rounds} rounds); then the rest of the method, on these positions and normals.
 - *jet, front*: CGAL's jet smoothing over {jet} neighbours, then its advancing front.
 - *Poisson*: Open3D, PCA normals over 30 neighbours oriented along tangent planes, depth 8. It closes what is open.
-- *best PCA*: plane fit to the k nearest of the points as they come, k of {pca} with the highest NC on that very row,
-  which nobody can know without the truth.
+- *best PCA*: plane fit to the k nearest of the points as they come, k of {pca} with the highest NC
+  on that very row, which nobody can know without the truth.
 
 ![distance and CD over noise](noise/noise.png)
 
@@ -82,6 +94,14 @@ CPU time of a whole run, median over the rows: alternation {alternating_cost:.1f
 Published, **on other shapes** and so no comparison but a scale: for the paper's method, CD 1.20 at .3 % and 2.31 at
 .8 % noise; with 2 % and 5 % of outliers 1.089 and 1.050, and .194 and .150 for a later method.
 
+### Noise in one half
+
+Noise of {half_noise:g} % in the half with larger x. *moved*: shares of the noisy and of the clean half that are moved.
+
+{halves}
+
+All {clean_runs} clean samplings of cases in the folder were looked at for noise too; taken for noisy: {taken}.
+
 ## Strays
 
 Points uniform in the box of the shape, 1.1 times enlarged, added to the clean ones; *strays* is their number over that
@@ -89,6 +109,9 @@ of the clean points. *found*: share of them dropped. *lost*: share of the shape'
 *left in*: the same with `outliers=False`.
 
 {strays}
+
+Among the wires of a box, {wire_points:,} points on its edges and {wire_share:.0%} of strays, {wire_found:.0%} of these
+are found and {wire_lost:.1%} of the points lost: a stray beside a wire looks like a point of another one.
 
 ## Bad input
 
@@ -99,8 +122,9 @@ returned, with its warnings, or the one line of its refusal.
 
 Beyond these, {fuzz_runs} combinations of clouds (spheres, grids, planes, close sheets, noise) with duplicates, NaN,
 far points, far copies, strays, noise and rounding, as several array types, at scales from 1e-9 to 1e9:
-{fuzz_done} done, {fuzz_refused} refused in one line, {fuzz_crashed} crashed, {fuzz_nan} with NaN, {fuzz_hung} hung; the
-longest took {fuzz_seconds:.1f} s. The tests draw more of them, and kill runs over existing output at random moments.
+{fuzz_done} done, {fuzz_refused} refused in one line, {fuzz_crashed} crashed, {fuzz_nan} with NaN, {fuzz_hung} hung;
+the longest took {fuzz_seconds:.1f} s. The tests draw more of them, and kill runs over existing output at random
+moments.
 
 ## Stopping a run
 
@@ -127,7 +151,7 @@ def main(arguments: list[str] | None = None) -> int:
     def command():
         paths = find_cases(given.folder, given.cases)
         (shape,) = find_cases(given.folder, [SHAPE])
-        measured = measure([load_case(path) for path in paths])
+        measured = measure([load_case(path) for path in paths], find_cases(given.folder))
         print(f"wrote {write_page(measured, given.docs)}")
         picture(given.docs / "noise" / "surfaces.png", load_case(shape))
         return DONE
@@ -135,14 +159,17 @@ def main(arguments: list[str] | None = None) -> int:
     return exit_status(command)
 
 
-def measure(cases) -> dict:
-    """Everything that the page shows, printing what is done as it finishes."""
+def measure(cases: list[Case], others: list[Path]) -> dict:
+    """Everything that the page shows, printing what is done as it finishes. `others` are looked at for noise alone."""
     check_open3d()
     return {
         "versions": {"Python": platform.python_version(), **dict(_versions())},
         "hostile": _said("bad input", tried()),
         "fuzz": _said("fuzz", fuzzed()),
+        "clean": dict(_said("clean cases", list(_clean(others)))),
+        "halves": [_said(f"{case.name}, half noisy", measure_half(case, HALF_NOISE)) for case in cases],
         "strays": [_said(f"{case.name}, strays {s:.0%}", measure_strays(case, s)) for case in cases for s in STRAYS],
+        "wires": _said("strays among wires", measure_wires()),
         "silences": {
             name: _said(f"silences, {name}", silences(_sphere(deviation), Settings(surface="both")))
             for name, deviation in (("clean", 0.0), ("noisy", SILENCE_NOISE))
@@ -150,6 +177,16 @@ def measure(cases) -> dict:
         "noise": [_said(f"{case.name}, noise {p} %", measure_noise(case, p)) for case in cases for p in NOISE],
         "categories": {case.name: case.meta["category"] for case in cases},
     }
+
+
+def _clean(paths):
+    """Names of clean samplings and the shares of their points that are taken for noisy."""
+    for path in paths:
+        for sampling in SAMPLINGS:
+            if has_sampling(path, sampling):
+                case = load_case(path, sampling)
+                if case.meta["category"] not in SPOILED:
+                    yield f"{case.name}, {sampling}", share_noisy(case)
 
 
 def _versions():
@@ -193,7 +230,15 @@ def write_page(measured: dict, docs: Path) -> Path:
         surfaces=_markdown(_surfaces(measured["noise"])),
         alternating_cost=_cost(measured["noise"], "alternating"),
         poisson_cost=_cost(measured["noise"], "poisson"),
+        half_noise=HALF_NOISE,
+        halves=_markdown(_halves(measured["halves"])),
+        clean_runs=len(measured["clean"]),
+        taken=_listed(f"{share:.1%} of {name}" for name, share in measured["clean"].items() if share),
         strays=_markdown(_strays(measured["strays"])),
+        wire_points=measured["wires"]["points"],
+        wire_share=measured["wires"]["share"],
+        wire_found=measured["wires"]["found"],
+        wire_lost=measured["wires"]["lost"],
         resolution=RESOLUTION,
         hostile=_markdown(_hostile(measured["hostile"])),
         fuzz_runs=fuzz["runs"],
@@ -286,6 +331,19 @@ def _surfaces(rows):
         yield row["case"], f"{row['percent']:g}", *cells
 
 
+def _halves(rows):
+    yield "case", "moved", "noisy half, before → after", "CD", "`denoise=0`", "`denoise=1`"
+    for row in rows:
+        yield (
+            row["case"],
+            f"{row['found']:.1%} / {row['falsely']:.1%}",
+            f"{row['before']:.2f} → {row['after']:.2f}",
+            f"{row['cd']:.3f}",
+            f"{row['cd_none']:.3f}",
+            f"{row['cd_every']:.3f}",
+        )
+
+
 def _strays(rows):
     yield "case", "strays", "found", "lost", "CD", "HD", "pieces", "CD, left in"
     for row in rows:
@@ -304,7 +362,7 @@ def _strays(rows):
 def _hostile(rows):
     yield "given", "outcome", "got"
     for row in rows:
-        got = "".join(sign if sign.isprintable() and sign != "|" else "·" for sign in row["got"])
+        got = "".join(sign if sign.isascii() and sign.isprintable() and sign != "|" else "·" for sign in row["got"])
         yield row["given"], row["outcome"], got if len(got) <= _LINE else f"{got[:_LINE]} …"
 
 

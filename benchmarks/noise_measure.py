@@ -5,8 +5,11 @@ from importlib.util import find_spec
 import numpy as np
 
 from core import Mesh, Settings, reconstruct
+from core.cleaning.noise import noisy_samples
 from core.cleaning.offsets import alternate
+from core.cleaning.outliers import find_outliers
 from core.normals.pca import pca_normals
+from core.points import local_spacing, prepare_samples
 
 from .cases import Case
 from .geometry import closest_points
@@ -14,6 +17,7 @@ from .metrics import surface_errors, topology
 from .peers import PEERS, Clock, poisson
 
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
+HALF_NOISE = 0.5
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24
@@ -56,6 +60,37 @@ def measure_noise(case: Case, percent: float) -> dict:
     }
 
 
+def half_noisy(case: Case, percent: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n,3) of the case with the noise of `noisy` in the half with larger x, and which those are, (n,) bool."""
+    half = case.points[:, 0] > np.median(case.points[:, 0])
+    return np.where(half[:, None], noisy(case, percent, seed), case.points), half
+
+
+def measure_half(case: Case, percent: float) -> dict:
+    """What is found and made of noise in one half: shares of either half that move, distances of the noisy half to the
+    surface, x1e3, and CD, also with no point moved and with all."""
+    points, half = half_noisy(case, percent)
+    result, none, every = (reconstruct(points, Settings(denoise=strength)) for strength in ("auto", 0, 1))
+    moved, there = (result.points != points[result.source_index]).any(axis=1), half[result.source_index]
+    return {
+        "case": case.name,
+        "percent": percent,
+        "found": moved[there].mean(),
+        "falsely": moved[~there].mean(),
+        "before": _distance(points[half], case.truth),
+        "after": _distance(result.points[there], case.truth),
+        "cd": _errors(result.surface, case)["cd"],
+        "cd_none": _errors(none.surface, case)["cd"],
+        "cd_every": _errors(every.surface, case)["cd"],
+    }
+
+
+def share_noisy(case: Case) -> float:
+    """Share of the points of a case, as they are, that are taken for noisy."""
+    points = prepare_samples(case.points).points
+    return float(noisy_samples(points, local_spacing(points)).mean())
+
+
 def measure_strays(case: Case, share: float) -> dict:
     """Errors of the surface with strays looked for and, for the CD, not; shares of the strays found and of the case's
     own points lost with them; pieces of the surface, and the share of its faces in the largest."""
@@ -74,6 +109,16 @@ def measure_strays(case: Case, share: float) -> dict:
         "untreated_cd": surface_errors(untreated.surface, case.truth)["cd"],
         "pieces": topology(result.surface)["components"],
     }
+
+
+def measure_wires(count: int = 1000, share: float = 0.05, seed: int = 0) -> dict:
+    """Shares of the strays found among `count` points on the edges of a box, and of those points lost with them."""
+    rng = np.random.default_rng(seed)
+    points = rng.integers(0, 2, (count, 3)).astype(float)
+    points[np.arange(count), rng.integers(0, 3, count)] = rng.random(count)
+    strays = rng.uniform(0.5 - 0.5 * MARGIN, 0.5 + 0.5 * MARGIN, (int(share * count), 3))
+    dropped = find_outliers(prepare_samples(np.vstack([points, strays])).points)
+    return {"points": count, "share": share, "found": dropped[count:].mean(), "lost": dropped[:count].mean()}
 
 
 def _ours(case, points):

@@ -1,5 +1,6 @@
 """The plot and the picture of docs/noise.md."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -12,7 +13,7 @@ from core import reconstruct
 from core.io.atomic import atomic_path
 
 from .cases import Case
-from .noise_measure import noisy, strewn
+from .noise_measure import half_noisy, noisy, strewn
 from .pictures import View, caption, draw_points, draw_surface, save, sheet
 from .plots import COLOURS, QUIET, STYLE
 
@@ -51,15 +52,17 @@ def plot_noise(path: Path, rows: list[dict], category: str) -> None:
 
 
 def picture(path: Path, case: Case) -> None:
-    """Points and surfaces of a case with noise and with strays."""
+    """Points and surfaces of a case, whose y points up, with noise and with strays."""
+    case = replace(case, points=case.points[:, [0, 2, 1]] * [1, -1, 1])
     shown = [
         ("noise .5 %", noisy(case, 0.5)),
         ("noise 1.5 %", noisy(case, 1.5)),
+        ("noise .5 % in one half", half_noisy(case, 0.5)[0]),
         ("20 % strays", strewn(case, 0.2)),
     ]
     figure, panels = sheet(2, len(shown))
+    camera = _VIEW.camera(noisy(case, 1.5), _PIXELS)
     for (above, below), (title, points) in zip(panels.T, shown, strict=True):
-        camera = _VIEW.camera(points, _PIXELS)
         draw_points(above, points, camera)
         caption(above, title, f"{len(points):,} points")
         draw_surface(below, reconstruct(points).surface, camera, _VIEW)

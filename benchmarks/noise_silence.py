@@ -21,7 +21,7 @@ def silences(points: np.ndarray, settings: Settings) -> dict[str, dict]:
     looks.append((time.perf_counter(), time.process_time(), "end"))
     stages = defaultdict(lambda: {"looks": 0, "seconds": 0.0, "cpu": 0.0})
     for (seconds, cpu, stage), (seconds_after, cpu_after, _) in pairwise(looks):
-        found = stages[stage]
+        found = stages[stage or "report"]
         found["looks"] += 1
         found["seconds"] = max(found["seconds"], seconds_after - seconds)
         found["cpu"] = max(found["cpu"], cpu_after - cpu)

@@ -74,10 +74,10 @@ comes out is compared with the true normals. NC is |n·n\\*| at the input points
   facets are clipped and lengths measured in local spacings as in all of the above, which the paper does not do.
 
 *error / best PCA's* is 1 − NC of the sweeps over that of the best PCA. True normals are those of the true mesh's flat
-triangles; *truth's facets* is what these alone cost: 1 − NC of the same mesh's normals interpolated between its vertices,
-again over that of the best PCA. Where the mesh stands for a smooth shape, sampled more coarsely than its triangles, no
-estimate can be expected below that; where its edges are meant, the number says nothing. *random start* how much NC changes when the
-sweeps start from random axes, and *E_d / Adam's* the E_d of the paper that the sweeps end with over what Adam reaches.
+triangles; *truth's facets* is what these alone cost: 1 − NC of the same mesh's normals interpolated between its
+vertices, again over that of the best PCA. Where the mesh stands for a smooth shape, no smooth estimate can be expected
+below that; where its edges are meant, the number says nothing. *random start* is how much NC changes when the sweeps
+start from random axes, and *E_d / Adam's* the E_d of the paper that the sweeps end with over what Adam reaches.
 
 ## What is met and what is not
 
@@ -101,9 +101,8 @@ its own shapes, are .9103 to .9617 at 3,000 points and .9735 to .9844 at 10,000.
 
 Both from random axes, on points of {shape}: 20,000 (*dense*), the blue-noise sampling of the case (*uniform*),
 a density that falls thirtyfold along its longest side (*non-uniform*), 500 (*sparse*), and Gaussian noise of .5 % of
-the longest side (*noisy*). Shown are the first {curve_steps} steps and the first {curve_sweeps} sweeps. The alignment
-term is strong in the first dozen and falls; after twenty every axis is held back a little, which ends what still swings
-at creases.
+the longest side (*noisy*). Shown are the first {curve_steps} steps and the first {curve_sweeps} sweeps; after twenty of
+these the solver holds every axis back a little, which ends what still swings at creases.
 
 {steps}
 
@@ -199,9 +198,7 @@ def verdicts(measured: dict) -> Iterator[str]:
             f"{_word(ratio <= TARGET_RATIO)}, {sampling}: 1 − NC of the sweeps over that of the best PCA is "
             f"{ratio:.2f} on average over the {len(clean)} cases without added noise (at most {TARGET_RATIO} is asked)."
         )
-        if high := [
-            result for result in results if result["category"] != "noisy" and result["error_ratio"] > TARGET_RATIO
-        ]:
+        if high := [r for r in results if r["category"] != "noisy" and r["error_ratio"] > TARGET_RATIO]:
             listed = "; ".join(f"{r['case']} {r['error_ratio']:.2f} ({r['faceting']:.2f})" for r in high)
             yield f"{sampling}: above {TARGET_RATIO} are, with what the truth's facets alone cost, {listed}."
         above = _above_pca(results, "pca")

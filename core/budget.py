@@ -14,9 +14,15 @@ from .settings import Settings, options
 
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 
-# Measured on runs with default settings over 1,000 to 100,000 samples, resolutions of 64 to 320.
-_MEMORY = {"diagram": 30.0, "sample": 5.8e-3, "field": 130.0, "node": 46e-6}  # MiB
+# Measured on runs with default settings over 1,000 to 300,000 samples, resolutions of 64 to 320.
+_MEMORY = {"diagram": 15.0, "sample": 2.2e-3, "field": 130.0, "node": 46e-6}  # MiB
 _SECONDS = {"fixed": 0.3, "sample": 8e-5, "near": 9e-6, "node": 4e-7}  # where the probe takes _PROBE
+
+# The same in a band, at resolutions of 256 and 512: by squared cells of the surface, with sides told apart or not.
+_BAND_MEMORY = {"field": 110.0, "surface": 1.9e-3, "surface with sides": 3.6e-3}  # MiB
+_WITH_SIDES = "single", "both", "signed"
+_BAND_NEAR = 3.4, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
+_BAND_SECONDS = 2e-6  # for a node further out
 _PROBE = 0.006
 _NEAR = 2.9  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
@@ -30,15 +36,25 @@ class Estimate:
 
 
 def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings()) -> Estimate:
-    """Cost of a run with default settings over clean samples with local spacing (n,), in the units of the grid.
+    """Cost of a run over clean samples with local spacing (n,), in the units of the grid. Of the settings only the
+    resolution, the band and, within a band, the kind of surface count.
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
     """
     cells = spacing / grid.spacing
-    near = 2.0 * float(np.sum(cells**2 * (_NEAR + cells)))
-    nodes = float(np.prod(grid.shape))
-    work = _SECONDS["fixed"] + _SECONDS["sample"] * len(spacing) + _SECONDS["near"] * near + _SECONDS["node"] * nodes
-    return Estimate(work * _probe() / _PROBE, _memory(len(spacing), nodes))
+    work = _SECONDS["fixed"] + _SECONDS["sample"] * len(spacing)
+    if settings.band is None:
+        nodes = float(np.prod(grid.shape))
+        near = 2.0 * float(np.sum(cells**2 * (_NEAR + cells)))
+        work += _SECONDS["near"] * near + _SECONDS["node"] * nodes
+        memory = _MEMORY["field"] + _MEMORY["node"] * nodes
+    else:
+        area, (width, share) = float(np.sum(cells**2)), _BAND_NEAR
+        near = 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells))))
+        work += _SECONDS["near"] * near + _BAND_SECONDS * 2.0 * area * settings.band
+        kind = "surface with sides" if settings.surface in _WITH_SIDES else "surface"
+        memory = _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area
+    return Estimate(work * _probe() / _PROBE, max(memory, _diagram(len(spacing))))
 
 
 def check_budget(estimate: Estimate, samples: int, grid: Grid, settings: Settings) -> None:
@@ -48,13 +64,12 @@ def check_budget(estimate: Estimate, samples: int, grid: Grid, settings: Setting
         limit = FREE_SHARE * free_memory_mb()
     if estimate.memory_mb <= limit:
         return
-    cells = np.array(grid.shape) - 1
     least = options()["resolution"].metadata["limits"][0]
-    for resolution in range(settings.resolution - 1, least - 1, -1):
-        nodes = np.prod(np.ceil(cells * resolution / settings.resolution) + 2)
-        if _memory(samples, nodes) <= limit:
-            remedy = f"use resolution {resolution} or less, or raise memory_limit"
-            break
+    finer = range(settings.resolution - 1, least - 1, -1)
+    fitting = (r for r in finer if max(_diagram(samples), _at(r, estimate, grid, settings)) <= limit)
+    if resolution := next(fitting, None):
+        band = ", set band to 4" if settings.band is None and settings.integration == "transport" else ""
+        remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
     else:
         fitting = max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))
         remedy = f"thin the {samples} points to {fitting} or fewer, or raise memory_limit"
@@ -71,9 +86,18 @@ def free_memory_mb() -> float:
     return (_windows_available if sys.platform == "win32" else _mac_available)()
 
 
-def _memory(samples, nodes):
-    """The Voronoi diagram is gone before the grid is filled, so the larger of the two counts."""
-    return max(_MEMORY["diagram"] + _MEMORY["sample"] * samples, _MEMORY["field"] + _MEMORY["node"] * nodes)
+def _diagram(samples):
+    """MiB of the Voronoi diagram, which is gone before the grid is filled: the larger of the two counts."""
+    return _MEMORY["diagram"] + _MEMORY["sample"] * samples
+
+
+def _at(resolution, estimate, grid, settings):
+    """MiB of the field at another resolution."""
+    ratio = resolution / settings.resolution
+    if settings.band is not None:
+        return _BAND_MEMORY["field"] + (estimate.memory_mb - _BAND_MEMORY["field"]) * ratio**2
+    nodes = np.prod(np.ceil((np.array(grid.shape) - 1) * ratio) + 2)
+    return _MEMORY["field"] + _MEMORY["node"] * nodes
 
 
 def _probe():

@@ -65,10 +65,10 @@ def reconstruct(
     with stages("normals"):
         if normals is None:
             part = progress.part(0.1, 0.2, "normals")
-            normals, confidence, counts = estimate_normals(samples.points, spacing, settings, constraints, part)
+            normals, confidence, solved = estimate_normals(samples.points, spacing, settings, constraints, part)
         else:
             normals, confidence = known_normals(normals, given, samples.source_index)
-            counts = {}
+            solved = {}
 
     with stages("field"):
         part = progress.part(0.2, 0.25, "distance field")
@@ -89,12 +89,12 @@ def reconstruct(
         "counts": {
             "input": given,
             "samples": len(samples.points),
-            **counts,
             "rim_samples": int((local.rims.gap & ~local.rims.bridged).sum()),
             "bridged_samples": int(local.rims.bridged.sum()),
             "nodes": surfaces.values.size,
         },
         "cleaning": cleaning,
+        "normals": solved,
         "meshes": {
             kind: {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": mesh.border_loops()}
             for kind, mesh in surfaces.meshes.items()

@@ -36,7 +36,7 @@ class Settings:
     band: float | None = _option(
         None,
         "Evaluate the distance only this near the surface, or in the whole box. With a band, 4 for instance, time and "
-        "memory grow with the surface, not with the box; meshes are the same",
+        "memory grow with the surface, not with the box; the meshes hardly change",
         limits=(3.0, 32.0),
         word="none",
         unit="cells",
@@ -92,7 +92,7 @@ class Settings:
     denoise: float = _option(
         "auto",
         "How far points are moved onto the smooth surface through their neighbours: not at all (0) to all the way (1). "
-        "With auto all the way where the whole scan is found noisy, else not at all",
+        "With auto all the way where the scan, or a good part of it, is found noisy, else not at all",
         limits=(0.0, 1.0),
         word="auto",
     )
@@ -157,8 +157,10 @@ def _checked(option, value):
             raise SettingsError(f"{name} is {value!r}; it must be True or False")
         return bool(value)
     if metadata["word"]:
-        if isinstance(value, str) and value == metadata["word"] or value is None and option.default is None:
-            return None if option.default is None else value
+        if value is None and option.default is None:
+            return None
+        if isinstance(value, str) and value == metadata["word"]:
+            return option.default if option.default is None else value
         value = _number(value)
     kind = numbers.Integral if option.type is int else numbers.Real
     low, high = metadata["limits"]

@@ -90,7 +90,7 @@ class Run:
             self.layout.label(text="This took a while: run it again for other settings", icon="INFO")
             return
         self.layout.use_property_split = True
-        for name in self.__annotations__:
+        for name in type(self).__annotations__:
             self.layout.prop(self, name)
 
     def _prepared(self, context):

@@ -89,7 +89,9 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
         obj = results.estimate(scene, origin)
         if obj is None:
             obj = _placed(scene, source, cloud, found.origin)
-            obj[results.ROLE], obj[results.SOURCE] = results.ESTIMATE, origin
+            obj[results.ROLE] = results.ESTIMATE
+            if origin is not None:
+                obj[results.SOURCE] = origin
         else:
             datablocks.replace_data(obj.data, cloud)
             obj.location = found.origin

@@ -22,6 +22,9 @@ _STRAY = 4.5  # errors count as at most this many median ones
 _FREEDOM = 2.0  # a robust fit follows its samples more than its leverage says
 _UNEVEN = 2.0  # a region's noise counts as at most this many times the median: two close sheets look like noise
 
+_SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
+_CORE_LEVEL = 0.1  # local spacings: a part's core is above this
+_CORE_AGREED = 0.87  # and its normals agree less than this; creases and thin sheets kept above .88
 _EVERYWHERE = 0.04  # local spacings: nine tenths of the regions of a noisy cloud are above it
 _LEVEL = 0.05  # local spacings: half of them are above this
 _GROWTH = 1.15  # from 12 to 20 neighbours noise hardly grows, detail that the samples miss does
@@ -41,15 +44,19 @@ class Noise:
     neighbours: np.ndarray
 
 
-def is_noisy(points, spacing, seed: int = 0, progress=None) -> bool:
-    """Whether samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
+def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
+    """(n,) bool: which samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
 
-    Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise is everywhere
-    and looks alike from 12 and from 20 neighbours; creases and unresolved detail are in places, or grow. Sheets closer
-    than their samples look like noise to the quadrics, but normals agree there from sample to sample, as in no noise.
+    Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise looks alike from
+    12 and from 20 neighbours; unresolved detail grows. Sheets closer than their samples look like noise to the
+    quadrics, but normals agree there from sample to sample, as in no noise.
+
+    A cloud is noisy as a whole where nearly all of it looks so. Otherwise its noisy parts are those that look so
+    around a core that is well above all limits and not small: creases and thin sheets look noisy in places.
     """
+    clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
-        return False
+        return clean
     progress = Progress.of(progress)
     anchors, region = _anchors(points, seed)
     fine, wide = (
@@ -57,16 +64,34 @@ def is_noisy(points, spacing, seed: int = 0, progress=None) -> bool:
         for k, part in zip(LADDER, (progress.part(0.0, 0.05), progress.part(0.05, 0.1)), strict=False)
     )
     relative = wide / np.median(spacing[anchors][region], axis=1)
-    growth = np.median(wide / np.maximum(fine, np.finfo(float).tiny))
+    growth = wide / np.maximum(fine, np.finfo(float).tiny)
     everywhere, level = np.percentile(relative, (10, 50))
-    if everywhere <= _EVERYWHERE or level <= _LEVEL or (growth >= _GROWTH and level <= _DROWNED):
-        return False
+    whole = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
+    suspect = _rough(relative, growth)
+    least = max(_REGION, _SMALLEST_PART * len(anchors))
+    if not whole and suspect.sum() < least:
+        return clean
+
     _, confidence, _ = estimate_normals(points, spacing, progress=progress.part(0.1, 1.0))
-    return bool(np.median(confidence) < _AGREED)
+    if whole and np.median(confidence) < _AGREED:
+        return ~clean
+    agreement = np.median(confidence[anchors][region], axis=1)
+    suspect &= agreement < _AGREED
+    core = suspect & (relative > _CORE_LEVEL) & (agreement < _CORE_AGREED)
+    if core.sum() < least:
+        return clean
+    suspect &= core[region].any(axis=1)
+    noisy = suspect[region[:, :_SMOOTHING]].mean(axis=1) > 0.5
+    return noisy[KDTree(points[anchors]).query(points, workers=-1)[1]]
 
 
-def estimate_noise(points, seed: int = 0, progress=None) -> Noise:
-    """Noise level and best neighbourhood of samples (n,3), n > 12.
+def _rough(relative, growth):
+    """Whether errors in local spacings, and their growth from 12 to 20 neighbours, are those of noise."""
+    return (relative > _LEVEL) & ((growth < _GROWTH) | (relative > _DROWNED))
+
+
+def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
+    """Noise level and best neighbourhood of samples (n,3), n > 12; for those marked in `noisy`, (n,) bool, where given.
 
     A quadric through the k nearest misses the sample that it leaves out by the noise and by what it cannot bend to.
     The level is read off the smallest neighbourhood wide enough to see the noise. The risk of that one and of each
@@ -92,7 +117,7 @@ def estimate_noise(points, seed: int = 0, progress=None) -> Noise:
     every = np.arange(len(anchors))
     first = _first(radius >= _SEEN * missed)
     level = missed[first, every] * np.sqrt(1.0 - leverage[first, every])
-    level = np.minimum(level, _UNEVEN * np.median(level))
+    level = np.minimum(level, _UNEVEN * np.median(level if noisy is None else level[noisy[anchors]]))
     risk = squared + 2 * _FREEDOM * level**2 * leverage
     risk[np.arange(len(ladder))[:, None] < _first(radius >= _USABLE * level)] = np.inf
     neighbours = np.exp(np.log(ladder)[risk.argmin(axis=0)][region[:, :_SMOOTHING]].mean(axis=1))

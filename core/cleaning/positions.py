@@ -7,7 +7,7 @@ first. Robust quadrics through the neighbours need no diagram, and their normals
 import numpy as np
 
 from ..progress import Progress
-from .noise import LADDER, estimate_noise, is_noisy
+from .noise import LADDER, estimate_noise, noisy_samples
 from .quadrics import fit_quadrics
 
 LONGEST_MOVE = 4.0  # standard deviations of the noise
@@ -21,29 +21,33 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     """Samples moved towards quadrics through their neighbours, and what was done, for the report.
 
     points   : (n,3) float64     spacing : (n,) float64, local spacing, same units
-    strength : "auto" moves all samples of a noisy cloud and none of a clean one; a number in [0,1] moves those of any
-               cloud this share of the way (0 none)
+    strength : "auto" moves the samples that are found noisy; a number in [0,1] moves all this share of the way (0 none)
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
     nothing is to do.
     """
     progress = Progress.of(progress)
-    if strength == "auto":
-        strength = float(is_noisy(points, spacing, seed, progress.part(0.0, 0.1)))
-    if strength == 0 or len(points) <= LADDER[0]:
+    if len(points) <= LADDER[0]:
         return points, {}
-    noise = estimate_noise(points, seed, progress.part(0.1, 0.4))
+    if strength == "auto":
+        noisy, strength = noisy_samples(points, spacing, seed, progress.part(0.0, 0.1)), 1.0
+    else:
+        noisy = np.full(len(points), strength > 0)
+    if not noisy.any():
+        return points, {}
+    noise = estimate_noise(points, seed, progress.part(0.1, 0.4), noisy)
     neighbours = _rounded(_SHARE * noise.neighbours, len(points))
     moved = points
     for turn in range(_PASSES):
-        moved = _onto_quadrics(moved, neighbours, progress.part(0.4 + 0.15 * turn, 0.55 + 0.15 * turn))
+        moved = _onto_quadrics(moved, noisy, neighbours, progress.part(0.4 + 0.15 * turn, 0.55 + 0.15 * turn))
     step = strength * (moved - points)
     length = np.linalg.norm(step, axis=1)
     step *= np.minimum(1.0, LONGEST_MOVE * noise.level / np.maximum(length, np.finfo(float).tiny))[:, None]
     counts = {
-        "noise": float(np.median(noise.level)),
-        "neighbours": [int(k) for k in np.percentile(neighbours, (5, 50, 95), method="nearest")],
-        "mean_move": float(np.linalg.norm(step, axis=1).mean()),
+        "noisy": int(noisy.sum()),
+        "noise": float(np.median(noise.level[noisy])),
+        "neighbours": [int(k) for k in np.percentile(neighbours[noisy], (5, 50, 95), method="nearest")],
+        "mean_move": float(np.linalg.norm(step[noisy], axis=1).mean()),
     }
     return points + step, counts
 
@@ -54,11 +58,11 @@ def _rounded(neighbours, n):
     return np.clip(np.rint(2 ** (steps / _STEPS_PER_OCTAVE)).astype(int), LADDER[0], n - 1)
 
 
-def _onto_quadrics(points, neighbours, progress):
+def _onto_quadrics(points, noisy, neighbours, progress):
     moved = points.copy()
-    sizes = np.unique(neighbours)
+    sizes = np.unique(neighbours[noisy])
     for i, k in enumerate(sizes):
-        rows = np.flatnonzero(neighbours == k)
+        rows = np.flatnonzero(noisy & (neighbours == k))
         part = progress.part(i / len(sizes), (i + 1) / len(sizes))
         moved[rows] += fit_quadrics(points, rows, int(k), part).step
     return moved

@@ -60,7 +60,7 @@ class Blocks:
         return fits[:, 0, :, None, None] & fits[:, 1, None, :, None] & fits[:, 2, None, None, :]
 
     def nodes(self, chosen: np.ndarray) -> np.ndarray:
-        """Flat indices, ascending, of the stored nodes marked in `chosen`, (b,8,8,8) bool and false outside the grid."""
+        """Flat indices, ascending, of the stored nodes marked in `chosen`, (b,8,8,8) bool, false outside the box."""
         entry = np.flatnonzero(chosen)
         at = np.stack(np.unravel_index(entry % _NODES, (SIDE,) * 3), axis=1)
         at += self.corners()[entry // _NODES]

@@ -1,4 +1,4 @@
-"""The distance field of a narrow band: evaluated near the surface alone, so that its cost grows with the surface and not
+"""The distance field of a narrow band: evaluated near the surface alone, so that its cost grows with the surface, not
 with the box.
 
 Blocks, then groups of 4^3 and of 2^3 nodes are left out where their nearest sample is too far for the surface to come
@@ -49,9 +49,8 @@ def _groups(surface, grid, width, progress):
     block, reach = _blocks(surface, grid, width)
     corner = SIDE * np.stack(np.unravel_index(block, table_shape(grid.shape)), axis=1).astype(np.int32)
     found = []
-    pieces = max(1, len(block) * 64 // _PIECE)
-    for number, (part, far) in enumerate(zip(np.array_split(corner, pieces), np.array_split(reach, pieces))):
-        progress(number / pieces)
+    for rows in progress.chunks(len(block), _PIECE // 64):
+        part, far = corner[rows], reach[rows]
         for side in (4, 2):
             part = (part[:, None] + side * _CORNERS.astype(np.int32)).reshape(-1, 3)
             far = np.repeat(far, 8)
@@ -94,9 +93,8 @@ def _projected(surface, grid, corner, sample, progress):
     the rest of its nodes could make up for are left out first."""
     reach = sample_reach(surface)
     found = []
-    pieces = max(1, len(corner) // _PIECE)
-    for number, (part, own) in enumerate(zip(np.array_split(corner, pieces), np.array_split(sample, pieces))):
-        turn = progress.part(number / pieces, (number + 1) / pieces)
+    for rows, turn in _pieces(progress, len(corner)):
+        part, own = corner[rows], sample[rows]
         middle = _middles(grid, part, 2)
         away = np.linalg.norm(middle - surface.points[own], axis=1)
         near = away <= reach[own] + grid.spacing * (BAND + 2 * _HALF)
@@ -113,11 +111,9 @@ def _projected(surface, grid, corner, sample, progress):
 
 
 def _feet(surface, grid, node, near, progress):
-    pieces = max(1, len(node) // _PIECE)
-    found = []
-    for number, rows in enumerate(np.array_split(np.arange(len(node)), pieces)):
-        turn = progress.part(number / pieces, (number + 1) / pieces)
-        found.append(settled_feet(surface, grid, node[rows], near[rows], turn)[1])
+    found = [
+        settled_feet(surface, grid, node[rows], near[rows], turn)[1] for rows, turn in _pieces(progress, len(node))
+    ]
     return Feet(
         *(np.concatenate([getattr(feet, name) for feet in found], axis=-1) for name in ("centres", "normals", "radius"))
     )
@@ -129,9 +125,8 @@ def _around(surface, grid, width, corner, sample, feet, progress):
     background = np.float32(width * grid.spacing)
     block = np.unique(np.ravel_multi_index(tuple((corner // SIDE).T), table))
     values = blocks_of(grid.shape, block, background)
-    pieces = max(1, len(corner) // _PIECE)
-    for number, (part, own) in enumerate(zip(np.array_split(corner, pieces), np.array_split(sample, pieces))):
-        progress(number / pieces)
+    for rows in progress.chunks(len(corner), _PIECE):
+        part, own = corner[rows], sample[rows]
         away = np.linalg.norm(_middles(grid, part, 2) - surface.points[own], axis=1)
         foot, _ = feet.tree.query(_middles(grid, part, 2), workers=-1)
         found = np.minimum(away, foot) <= (width + 2 * _HALF) * grid.spacing
@@ -140,6 +135,12 @@ def _around(surface, grid, width, corner, sample, feet, progress):
         to_sample = np.linalg.norm(x - surface.points[own[found][group]], axis=1)
         values.put(node, np.minimum(np.minimum(to_sample, feet.distances(x)), background))
     return values
+
+
+def _pieces(progress, count):
+    """Slices that cover `count` rows in order, and the part of the progress that each takes."""
+    for first in range(0, count, _PIECE):
+        yield slice(first, first + _PIECE), progress.part(first / count, min(first + _PIECE, count) / count)
 
 
 def _middles(grid, corner, side):

@@ -8,13 +8,11 @@ and they agree on the whole plane exactly when each axis is, up to sign, the mir
 This holds on every plane, sphere and circular cylinder section, and it needs no signs. Each sweep sets every axis to
 the principal eigenvector of
 
-    A_i = sum_j w_ij [ (H_ij n_j)(H_ij n_j)^T - lambda d d^T ],    w_ij = facet area / |p_j - p_i|,
+    A_i = sum_j w_ij [ (H_ij n_j)(H_ij n_j)^T - d d^T ],    w_ij = facet area / |p_j - p_i|,
 
 all sites at once. The term -d d^T is the alignment regulariser with (v.d)^2; the printed (1 - v.d)^2 has a linear part
-that pulls axes into the surface wherever neighbours are one-sided. Alone it is a Voronoi-weighted plane fit, whose
-minimum does not depend on any start, and that is where the sweeps are led from: lambda falls from 8 to 1 in the first
-dozen. At lambda = 1 throughout, axes at creases and in sparse parts keep to whichever of several fixed points they
-start near (six random starts on eleven inputs: mean |n.n_true| up to .0024 from that of a plane fit, led .0006).
+that pulls axes into the surface wherever neighbours are one-sided. Without a start the first sweep has that term
+alone, which is a Voronoi-weighted plane fit.
 
 How that relates to the energy: H_ij takes x - p_j to x - p_i for every x on the bisector, so with m = H_ij n_j
 
@@ -35,10 +33,8 @@ from ..voronoi.facets import Facets
 from .mirrors import Mirrors
 
 MAX_SWEEPS = 100
-LED_SWEEPS = 12
 TOLERANCE = 5e-4  # mean turn of an axis in a sweep, radians
 
-_LEAD = 8.0  # lambda in the first sweep
 _FREE_SWEEPS = 20
 _INERTIA = 0.25  # after the free sweeps each axis holds on to itself by this share, which ends two-cycles at creases
 
@@ -63,14 +59,13 @@ def reflection_sweeps(points, spacing, facets: Facets, constraints=None, start=N
         turned[fixed] = axes
         cosine = np.abs(np.einsum("ni,ni->n", turned, normals))
         normals = turned
-        if sweep >= LED_SWEEPS and np.arccos(np.minimum(cosine, 1.0)).mean() < TOLERANCE:
+        if np.arccos(np.minimum(cosine, 1.0)).mean() < TOLERANCE:
             break
     return normals, mirrors.confidence(normals), sweep
 
 
 def sweep_once(mirrors: Mirrors, normals: np.ndarray, sweep: int) -> np.ndarray:
     """The axes (n,3) after a sweep, counted from 1."""
-    alignment = _LEAD ** max(0.0, 1 - (sweep - 1) / (LED_SWEEPS - 1))
     inertia = _INERTIA if sweep > _FREE_SWEEPS else 0.0
     agreement = mirrors.gather @ outer(mirrors.images(normals))
-    return principal_axes(agreement - alignment * mirrors.alignment + inertia * outer(normals))[0]
+    return principal_axes(agreement - mirrors.alignment + inertia * outer(normals))[0]

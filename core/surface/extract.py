@@ -45,7 +45,8 @@ def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
 def extract_surfaces(
     values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
 ) -> Surfaces:
-    """The meshes that `settings.surface` names, from distances `values` (nx,ny,nz) float32 or Blocks and the band near it.
+    """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
+    :func:`band_for` says, and the nodes near the surface.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed.

@@ -36,8 +36,8 @@ def signed_distance(values, sides: Sides, surface: LocalSurface, place) -> np.nd
 
 
 def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
-    """The zero set of signed distances (nx,ny,nz) float32 or Blocks, pulled onto the surface where that is within a cell, and
-    smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards."""
+    """The zero set of signed distances, (nx,ny,nz) float32 or Blocks, pulled onto the surface where that is within a
+    cell, and smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards."""
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
     cells, faces = isosurface(each(lambda u: np.clip(u, -limit, limit), values), 0.0)

@@ -57,6 +57,25 @@ def test_a_shell_lies_at_its_distance_on_both_sides(blender, result):
         assert len(mesh.polygons) > 100
 
 
+def test_in_a_band_shells_and_slices_show_as_far_as_it_goes(blender, scan, tmp_path):
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    blender.ops.vad.reconstruct(resolution=48, band="4")
+    (field,) = (obj for obj in blender.context.scene.vad.result.objects if obj["vad_role"] == "field")
+    cell = field.data["vad_cell"]
+    blender.ops.vad.shell(offset=2)
+    points, mesh = evaluated(blender, blender.context.active_object)
+    assert_allclose(np.abs(np.linalg.norm(points, axis=1) - 1), 2 * cell, atol=cell)
+    assert len(mesh.polygons) > 100
+    blender.ops.vad.slice(axis="Z")
+    points, mesh = evaluated(blender, blender.context.active_object)
+    distance = np.empty(len(points), np.float32)
+    mesh.attributes["distance"].data.foreach_get("value", distance)
+    expected = np.minimum(np.abs(np.linalg.norm(points, axis=1) - 1), 4 * cell)
+    inside = (np.abs(points) < 1).all(axis=1)
+    assert_allclose(distance[inside], expected[inside], atol=cell)
+    assert distance[inside].max() == pytest.approx(4 * cell, rel=1e-5)
+
+
 def test_a_slice_shows_the_distance_where_it_lies(blender, result):
     blender.ops.vad.slice(axis="Z")
     plane = blender.context.active_object

@@ -148,6 +148,9 @@ def test_extracting_again_keeps_places_materials_and_the_source(blender, scan):
     place = made["surface"].location.copy()
     made["surface"].data.materials.append(blender.data.materials.new("Mine"))
     made["field"].hide_set(False)
+    edited = values(made["samples"].data, "position", "vector", 3)
+    edited[0] *= 1.2  # moves the centre
+    made["samples"].data.attributes["position"].data.foreach_set("vector", edited.ravel())
     blender.ops.vad.reextract(resolution=24, offset=2.0)
     assert by_role(blender) == made
     assert made["surface"].location == place
@@ -169,6 +172,13 @@ def test_what_is_missing_is_said(blender, scan, add):
     for operator in (blender.ops.vad.denoise, blender.ops.vad.normals):
         with pytest.raises(RuntimeError, match=r"Eye \(camera\) holds no points"):
             operator()
+
+
+@pytest.mark.parametrize("operator", ["denoise", "normals"])
+def test_a_source_deleted_meanwhile_is_survived(blender, scan, extension, monkeypatch, operator):
+    monkeypatch.setattr(extension("vad_addon.points_in"), "object_of", lambda source: None)
+    assert getattr(blender.ops.vad, operator)() == {"FINISHED"}
+    assert len([obj for obj in blender.context.scene.objects if obj.type == "POINTCLOUD"]) == 1
 
 
 @pytest.mark.parametrize("operator", ["denoise", "normals"])

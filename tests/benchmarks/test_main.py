@@ -64,10 +64,13 @@ def test_a_run_measures_a_sphere(saved):
 def test_the_page_is_made_of_the_runs(saved, tmp_path, monkeypatch):
     run = json.loads(saved[0].read_text())
     monkeypatch.setattr("benchmarks.results.DOCS", tmp_path)
-    text = write_results({"uniform": run, "blue noise": run}).read_text()
+    run["repeats"] = 3
+    text = write_results({"uniform": run, "blue noise": run}, "mine").read_text()
     assert text.count("| ball |") == 1 + 2 * 7
     assert "bridge 3.5" in text
-    assert json.loads((tmp_path / "results" / "blue_noise.json").read_text()) == run
+    assert "`python -m benchmarks FOLDER --results --page mine --repeats 3`" in text
+    assert "[blue noise](mine/blue_noise.json)" in text
+    assert json.loads((tmp_path / "mine" / "blue_noise.json").read_text()) == run
 
 
 def test_the_fixture_is_a_case(folder):
@@ -84,6 +87,8 @@ def test_the_fixture_is_a_case(folder):
         (["{folder}", "--set", "shine=1"], "'shine=1' sets nothing; write NAME=VALUE"),
         (["{folder}", "--compare", "{folder}/ball.npz"], "cannot be read as a saved run"),
         (["{folder}", "--results", "--cases", "ball"], "--results covers all cases"),
+        (["{folder}", "--page", "mine"], "--page names the page that --results writes"),
+        (["{folder}", "--repeats", "0"], "'0' is no number of repeats"),
         (["{folder}", "--blue-noise"], "no case has blue noise samples"),
         (["{folder}", "--shine"], "unrecognized arguments: --shine"),
         ([], "the following arguments are required: FOLDER"),

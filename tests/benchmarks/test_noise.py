@@ -15,7 +15,17 @@ from benchmarks.cases import Case
 from benchmarks.metrics import surface_errors
 from benchmarks.noise import CASES, SHAPE, main, verdicts, write_page
 from benchmarks.noise_hostile import FILES, POINTS, tried
-from benchmarks.noise_measure import MARGIN, NOISE, STRAYS, measure_strays, noisy, strewn
+from benchmarks.noise_measure import (
+    MARGIN,
+    NOISE,
+    STRAYS,
+    half_noisy,
+    measure_strays,
+    measure_wires,
+    noisy,
+    share_noisy,
+    strewn,
+)
 from benchmarks.noise_silence import silences
 from core import Mesh, Settings
 from tests import shapes
@@ -41,6 +51,15 @@ def test_noise_has_the_deviation_asked_for(square):
     np.testing.assert_array_equal(noisy(square, 0.0), square.points)
 
 
+def test_half_of_a_case_stays_as_it_is(square):
+    points, half = half_noisy(square, 2.0)
+    assert half.sum() == 200
+    np.testing.assert_array_equal(points[~half], square.points[~half])
+    np.testing.assert_array_equal(points[half], noisy(square, 2.0)[half])
+    assert share_noisy(square) == 0.0
+    assert share_noisy(replace(square, points=noisy(square, 2.0))) == 1.0
+
+
 def test_strays_follow_the_points_and_fill_the_box(square):
     points = strewn(square, 0.5)
     np.testing.assert_array_equal(points[:400], square.points)
@@ -62,6 +81,10 @@ def test_strays_found_and_points_lost_are_told_apart(square, monkeypatch):
     clean = measure_strays(crossing, 0.0)
     assert clean["found"] is None
     assert clean["cd"] == clean["untreated_cd"] < 20
+
+
+def test_wires_are_not_lost():
+    assert measure_wires(300) == {"points": 300, "share": 0.05, "found": pytest.approx(0.5, abs=0.5), "lost": 0.0}
 
 
 def test_silences_count_every_look():
@@ -109,7 +132,23 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2):
         "versions": {"Python": "3.11"},
         "hostile": [{"given": "junk", "outcome": outcome, "got": "a|b\x07" + 300 * "c", "seconds": 0.1}],
         "fuzz": {"runs": 3, "done": 2, "refused": 1, "crashed": 0, "not finite": 0, "hung": 0, "seconds": 1.0},
+        "clean": {"one, uniform": 0.0, "other, uniform": 0.25},
+        "halves": [
+            {
+                "case": case,
+                "percent": 0.5,
+                "found": 0.97,
+                "falsely": 0.01,
+                "before": 3.2,
+                "after": 0.9,
+                "cd": 0.5,
+                "cd_none": 1.4,
+                "cd_every": 1.0,
+            }
+            for case in CASES
+        ],
         "strays": strays,
+        "wires": {"points": 1000, "share": 0.05, "found": 0.0, "lost": 0.0},
         "silences": {"clean": {"cleaning": {"looks": 3, "seconds": 0.4, "cpu": silence}}},
         "noise": rows,
         "categories": dict.fromkeys(CASES, "closed"),
@@ -120,7 +159,8 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
     measured = made_up()
     page = write_page(measured, tmp_path).read_text()
     for case in CASES:
-        assert page.count(f"| {case} |") == 3 * len(NOISE) + len(STRAYS)
+        assert page.count(f"| {case} |") == 3 * len(NOISE) + 1 + len(STRAYS)
+    assert "taken for noisy: 25.0% of other, uniform." in page
     assert "| junk | refused | a·b·ccc" in page
     assert "c …" in page
     assert (tmp_path / "noise" / "noise.png").stat().st_size > 10_000

@@ -22,7 +22,7 @@ from benchmarks.normal_quality import (
 from benchmarks.normals import main, verdicts, write_page
 from core import Mesh
 from core.normals.energy import EnergyWeights
-from core.normals.reflection import LED_SWEEPS, TOLERANCE, reflection_sweeps
+from core.normals.reflection import TOLERANCE, reflection_sweeps
 from tests import shapes
 
 TETRAHEDRON = Mesh(
@@ -49,13 +49,14 @@ def test_points_of_the_surface_come_with_the_normals_of_their_faces():
 
 
 def test_rounded_normals_are_those_of_the_vertices_and_between_them():
-    mesh = TETRAHEDRON
-    unit = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
-    middle = mesh.vertices[mesh.faces].mean(axis=1)
-    points = np.concatenate([mesh.vertices, middle])
-    expected = np.concatenate([unit, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
-    found = rounded_normals(Mesh(mesh.vertices, mesh.faces[:, [0, 2, 1]]), points)
-    np.testing.assert_allclose(np.abs(np.einsum("ni,ni->n", found, expected)), 1, atol=1e-6)
+    """On a low pyramid, wound at random: upright at the top, between both faces at a corner, and halfway halfway."""
+    vertices = np.array([[0, 0, 0.2], [1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+    pyramid = Mesh(vertices, np.array([[0, 1, 2], [0, 3, 2], [0, 3, 4], [0, 1, 4]], np.int32))
+    corner = np.array([0.2, 0.2, 2.0]) / np.linalg.norm([0.2, 0.2, 2.0])
+    halfway = 0.5 * (corner + np.array([0, 0, 1]))
+    expected = np.stack([[0, 0, 1], corner, halfway / np.linalg.norm(halfway)])
+    found = rounded_normals(pyramid, np.stack([vertices[0], vertices[1], vertices[:2].mean(axis=0)]))
+    np.testing.assert_allclose(np.abs(np.einsum("ni,ni->n", found, expected)), 1, atol=1e-9)
 
 
 def test_the_best_pca_is_the_best_of_those_tried(sphere):
@@ -71,8 +72,8 @@ def test_every_method_finds_the_normals_of_a_sphere(sphere):
 def test_turns_are_those_of_the_solver(sphere):
     turns = mean_turns(sphere.mirrors, sphere.mirrors.plane_fit(), CURVE_SWEEPS)
     _, _, count = reflection_sweeps(sphere.points, sphere.spacing, sphere.samples.facets)
-    ended = np.flatnonzero(np.array(turns) < np.degrees(TOLERANCE)) + 1
-    assert count == ended[ended >= LED_SWEEPS][0] < CURVE_SWEEPS
+    assert count < CURVE_SWEEPS
+    assert [turn < np.degrees(TOLERANCE) for turn in turns[:count]] == [False] * (count - 1) + [True]
 
 
 def test_the_seven_combinations_are_the_papers():

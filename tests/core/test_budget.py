@@ -16,25 +16,25 @@ from tests import shapes
 POINTS = shapes.sphere(1500)
 
 
-def cost(points, resolution):
+def cost(points, resolution, **others):
     grid = fit_grid(points, resolution)
-    return estimate_cost(local_spacing(points), grid), grid
+    return estimate_cost(local_spacing(points), grid, Settings(resolution=resolution, **others)), grid
 
 
 def test_more_points_and_finer_grids_cost_more():
-    small, fine, many = cost(POINTS, 64)[0], cost(POINTS, 256)[0], cost(shapes.sphere(60_000), 64)[0]
+    small, fine, many = cost(POINTS, 64)[0], cost(POINTS, 256)[0], cost(shapes.sphere(150_000), 64)[0]
     for dear in (fine, many):
         assert dear.seconds > 1.5 * small.seconds
         assert dear.memory_mb > 1.5 * small.memory_mb
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak of a child process is read from /proc")
-@pytest.mark.parametrize(("samples", "resolution"), [(2000, 192), (30_000, 64)])
-def test_memory_is_what_a_run_takes_within_two_fifths(samples, resolution):
+@pytest.mark.parametrize(("samples", "settings"), [(2000, "192"), (30_000, "64"), (2000, "192, band=4")])
+def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
     script = (
         "from core import Settings, reconstruct; from core.memory import peak_memory_mb; from tests import shapes;"
         f"points = shapes.sphere({samples}); before = peak_memory_mb();"
-        f"result = reconstruct(points, Settings(resolution={resolution}));"
+        f"result = reconstruct(points, Settings(resolution={settings}));"
         "print(result.report['estimate']['memory_mb'], peak_memory_mb() - before)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=os.getcwd())
@@ -52,6 +52,26 @@ def test_the_message_names_the_need_the_limit_and_a_resolution_that_fits():
     fitting = int(message.split("use resolution ")[1].split()[0])
     assert cost(POINTS, fitting)[0].memory_mb <= 300 < cost(POINTS, fitting + 8)[0].memory_mb
     assert reconstruct(POINTS, Settings(resolution=32, memory_limit=300, surface="none")).field.values.size
+
+
+def test_in_a_band_cost_grows_with_the_surface():
+    coarse, fine = (cost(POINTS, resolution, band=4)[0] for resolution in (512, 2048))
+    assert 12 < (fine.memory_mb - 110) / (coarse.memory_mb - 110) < 17
+    whole = cost(POINTS, 512)[0]
+    assert coarse.memory_mb < whole.memory_mb / 4
+    assert cost(POINTS, 512, band=4, surface="single")[0].memory_mb > 1.5 * coarse.memory_mb
+
+
+def test_a_band_is_the_remedy_and_has_one_itself():
+    with pytest.raises(MemoryBudgetError, match=r"set band to 4"):
+        reconstruct(POINTS, Settings(resolution=256, memory_limit=300))
+    settings = Settings(resolution=1024, band=4, memory_limit=1000)
+    estimate, grid = cost(POINTS, 1024, band=4)
+    with pytest.raises(MemoryBudgetError) as caught:
+        check_budget(estimate, 1500, grid, settings)
+    fitting = int(str(caught.value).split("use resolution ")[1].split()[0])
+    assert "band" not in str(caught.value)
+    assert cost(POINTS, fitting, band=4)[0].memory_mb < 1000 < cost(POINTS, fitting + 10, band=4)[0].memory_mb
 
 
 def test_too_many_points_for_any_grid_are_named():

@@ -37,6 +37,10 @@ def case(gui):
     yield 0.5
     gui.shot("1_cleaned")
     operator = last("VAD_OT_denoise")
+    yield from gui.key("F9")
+    yield 0.5
+    gui.shot("1_redo_panel")
+    yield from gui.key("ESC")
 
     def moved():
         attribute = bpy.data.objects["bust cleaned"].data.attributes["moved"]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.cleaning.noise import LADDER, estimate_noise, is_noisy
+from core.cleaning.noise import LADDER, estimate_noise, noisy_samples
 from core.points import local_spacing
 from tests import shapes
 
@@ -21,7 +21,7 @@ def noisy(points, deviation, seed=7):
 
 @pytest.mark.parametrize("name", CLEAN)
 def test_clean_clouds_are_not_noisy(name):
-    assert not is_noisy(CLEAN[name], local_spacing(CLEAN[name]))
+    assert not noisy_samples(CLEAN[name], local_spacing(CLEAN[name])).any()
 
 
 @pytest.mark.parametrize("share", [0.15, 0.5, 1.0])
@@ -29,16 +29,29 @@ def test_noise_is_noticed_and_measured(share):
     points = shapes.scattered_sphere(5000)
     deviation = share * np.median(local_spacing(points))
     points = noisy(points, deviation)
-    assert is_noisy(points, local_spacing(points))
+    assert noisy_samples(points, local_spacing(points)).all()
     assert np.median(estimate_noise(points).level) == pytest.approx(deviation, rel=0.2)
 
 
-def test_noise_in_one_place_is_no_noisy_cloud():
-    """What is rough in places may be detail."""
+@pytest.mark.parametrize(
+    ("shape", "share"), [(shapes.scattered_sphere(2000), 0.3), (shapes.torus(2000), 0.8), (shapes.moebius(1500), 0.3)]
+)
+def test_noise_of_one_half_is_found_there(shape, share):
+    points, half = shape.copy(), shape[:, 0] > 0
+    deviation = share * np.median(local_spacing(points))
+    points[half] = noisy(points[half], deviation)
+    found = noisy_samples(points, local_spacing(points))
+    assert found[half].mean() > 0.9
+    assert found[~half].mean() < 0.05
+    level = estimate_noise(points, noisy=found).level
+    assert np.median(level[found]) == pytest.approx(deviation, rel=0.25)
+
+
+def test_what_is_rough_in_a_small_place_may_be_detail():
     points = shapes.scattered_sphere(4000)
-    rough = points[:, 2] > 0.6
+    rough = points[:, 2] > 0.93
     points[rough] = noisy(points[rough], 0.02)
-    assert not is_noisy(points, local_spacing(points))
+    assert not noisy_samples(points, local_spacing(points)).any()
 
 
 def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():

@@ -29,6 +29,18 @@ def test_clean_samples_stay_to_the_bit(points):
     assert done == {}
 
 
+def test_only_the_noisy_part_moves():
+    points = shapes.scattered_sphere(2000)
+    half = points[:, 0] > 0
+    points[half] += np.random.default_rng(7).normal(size=(half.sum(), 3)) * 0.02
+    moved, done = denoise(points, local_spacing(points))
+    stirred = (moved != points).any(axis=1)
+    assert done["noisy"] == stirred.sum()
+    assert not stirred[points[:, 0] < -0.4].any()
+    before, after = (np.abs(shapes.sphere_distance(x[half])).mean() for x in (points, moved))
+    assert before > 2.5 * after
+
+
 def test_zero_is_off_and_half_goes_half_the_way():
     points = noisy_sphere(0.02, 1500)
     spacing = local_spacing(points)

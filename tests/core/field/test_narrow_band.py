@@ -131,7 +131,7 @@ def test_a_billion_nodes_cost_what_the_surface_costs(ball):
     field = BandedField(values, grid.origin, grid.spacing, CELLS * grid.spacing, False, feet.in_cells(grid))
     np.testing.assert_allclose(field.sample([[0, 0, 20], [0, 0, 1.1], [-49, 0, 0]]), [19, 0.1, 48], atol=0.02)
     with pytest.raises(VADError, match=r"1003003001 nodes.*sample"):
-        field.values
+        _ = field.values
 
 
 def test_sparse_samples_keep_every_node_of_the_band():

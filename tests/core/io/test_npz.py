@@ -76,3 +76,20 @@ def test_a_failure_leaves_the_old_file(result, tmp_path, monkeypatch):
         write_arrays(tmp_path / "ball.npz", result)
     assert os.listdir(tmp_path) == ["ball.npz"]
     assert (tmp_path / "ball.npz").read_text() == "old"
+
+
+def test_a_band_is_written_in_blocks(tmp_path):
+    run = reconstruct(shapes.sphere(500), Settings(resolution=32, band=3, surface="none"))
+    write_arrays(tmp_path / "field.npz", run)
+    with np.load(tmp_path / "field.npz", allow_pickle=False) as file:
+        arrays = dict(file)
+    assert arrays["shape"].tolist() == list(run.field.shape)
+    assert arrays["band"] == run.field.band
+    whole = np.full([8 * -(-n // 8) for n in run.field.shape], np.float32(run.field.band))
+    for (i, j, k), values in zip(arrays["block"], arrays["values"], strict=True):
+        whole[i : i + 8, j : j + 8, k : k + 8] = values
+    np.testing.assert_array_equal(whole[tuple(map(slice, run.field.shape))], run.field.values)
+    known = arrays["gradient"].any(axis=-1) & (arrays["values"] > 1.5 * run.field.spacing)
+    np.testing.assert_allclose(np.linalg.norm(arrays["gradient"][known], axis=-1), 1, atol=0.1)
+    assert known.sum() > 100
+    assert np.abs(shapes.sphere_distance(arrays["foot"])).max() < 0.1 * run.field.spacing

@@ -4,7 +4,9 @@ import resource
 import numpy as np
 import pytest
 
-from core import DistanceField, MissingDependency, VADError
+from core import BandedField, DistanceField, MissingDependency, VADError
+from core.field.blocks import blocks_of, table_shape
+from core.field.feet import Feet
 from core.io.openvdb_module import load_openvdb
 from core.io.vdb import write_vdb
 
@@ -110,3 +112,41 @@ def test_a_full_disk_is_noticed(openvdb, tmp_path):
 def test_a_missing_folder(openvdb, tmp_path):
     with pytest.raises(VADError, match="cannot be written"):
         write_vdb(tmp_path / "missing" / "field.vdb", plane())
+
+
+NO_FEET = Feet(np.empty((3, 0), np.float32), np.empty((3, 0), np.float32), np.empty(0, np.float32))
+
+
+def shell(radius, sdf):
+    """Distance to a sphere of `radius` cells around the middle of a box of 40^3 nodes, in a band of 3 cells."""
+    shape, limit = (40, 40, 40), np.float32(3 * SPACING)
+    distance = SPACING * (np.linalg.norm(np.indices(shape) - 19.6, axis=0) - radius)
+    signed = np.clip(distance if sdf else np.abs(distance), -limit, limit).astype(np.float32)
+    blocks = blocks_of(shape, np.arange(np.prod(table_shape(shape))), limit)
+    blocks.put(np.arange(signed.size), signed.reshape(-1))
+    return BandedField(blocks.merged(), ORIGIN, SPACING, 3 * SPACING, sdf, NO_FEET), signed
+
+
+@pytest.mark.parametrize("sdf", [False, True])
+def test_a_band_is_written_sparsely_and_comes_back_whole(openvdb, tmp_path, sdf):
+    """Inside the sphere there are constant blocks, of negative distances where signed."""
+    field, expected = shell(16.0, sdf)
+    assert len(field.blocks.stored) < 125
+    write_vdb(tmp_path / "field.vdb", field, gradient=True)
+    grids, _ = openvdb.readAll(str(tmp_path / "field.vdb"))
+    density, gradient, distance = sorted(grids, key=lambda grid: grid.name)
+    found, fog = np.empty((2, 40, 40, 40), np.float32)
+    slopes = np.empty((40, 40, 40, 3))
+    distance.copyToArray(found)
+    density.copyToArray(fog)
+    gradient.copyToArray(slopes)
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_allclose(fog, np.clip(1 - np.abs(expected) / (2 * SPACING), 0, 1), atol=1e-6)
+    assert distance.background == np.float32(3 * SPACING)
+    assert distance.leafCount() == len(field.blocks.stored)
+    assert fog.astype(bool).sum() == density.activeVoxelCount() < found.size / 4
+    known = np.abs(expected) < 1.9 * SPACING
+    known &= (np.abs(expected) > 1.1 * SPACING) | sdf
+    length = np.linalg.norm(slopes, axis=3)
+    np.testing.assert_allclose(length[known], 1, atol=0.02)
+    assert not length[np.abs(expected) >= 3 * SPACING].any()

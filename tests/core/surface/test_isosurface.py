@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from core import Mesh, MissingDependency
+from core.field.blocks import blocks_of, table_shape
 from core.io.openvdb_module import load_openvdb
 from core.surface.isosurface import isosurface
 from tests import shapes
@@ -80,3 +81,29 @@ def test_without_either_library_the_message_names_the_ways_out(monkeypatch):
     monkeypatch.setitem(sys.modules, "skimage.measure", None)
     with pytest.raises(MissingDependency, match=r"scikit-image.*surface='none'"):
         isosurface(ball(), 5.0)
+
+
+def in_blocks(values):
+    """The array in blocks; those of its largest or smallest value throughout are not stored."""
+    blocks = blocks_of(values.shape, np.arange(np.prod(table_shape(values.shape))), values.max())
+    blocks.put(np.arange(values.size), values.reshape(-1))
+    return blocks.merged()
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_blocks_give_the_surface_of_the_whole_box(level):
+    load_openvdb()
+    values = np.clip(ball() - 11.5, -3, 3)
+    sparse = in_blocks(values)
+    assert len(sparse.stored) < np.prod(sparse.slot.shape)
+    expected, faces = isosurface(values, level)
+    found, quads = isosurface(sparse, level)
+    order, other = np.lexsort(expected.T), np.lexsort(found.T)
+    np.testing.assert_array_equal(found[other], expected[order])
+    assert len(quads) == len(faces)
+
+
+def test_blocks_need_openvdb(monkeypatch):
+    monkeypatch.setattr(MODULE, "load_openvdb", missing)
+    with pytest.raises(MissingDependency, match=r"band needs OpenVDB.*surface='none'"):
+        isosurface(in_blocks(np.minimum(ball(), 3)), 1.0)
