@@ -23,7 +23,7 @@ _WAYS = {
     "jet": "jet smoothing, advancing front",
     "poisson": "Poisson",
 }
-_CLOSED = "closed"
+_CLOSED = "watertight"
 _VIEW, _PIXELS = View(), 380
 
 

@@ -9,9 +9,10 @@ from .budget import check_budget, estimate_cost
 from .cleaning.clean import clean
 from .field.distance_field import BandedField, DistanceField
 from .field.grid import fit_grid
-from .field.integration import NearBand, distance_field
+from .field.integration import distance_field
 from .field.local_surface import fit_local_surface
 from .field.narrow_band import banded_field, trimmed
+from .field.steps import NearBand
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
@@ -112,22 +113,22 @@ def reconstruct(
         source_index=samples.source_index,
         normals=normals,
         confidence=confidence,
-        field=_field(surfaces, feet, grid, samples, settings.band),
+        field=_field(surfaces, near, feet, grid, samples, settings.band),
         surface=surfaces.meshes.get("double", surfaces.meshes.get("signed")),
         sheet=surfaces.meshes.get("single"),
-        near=NearBand(near.node, near.step * samples.scale),
         report=report,
     )
 
 
-def _field(surfaces, feet, grid, samples, band):
+def _field(surfaces, near, feet, grid, samples, band):
     """The field in the input's units."""
+    near = NearBand(near.node, near.step * samples.scale)
     origin, cell = samples.to_input_units(grid.origin), grid.spacing * samples.scale
     sdf, scale = "signed" in surfaces.meshes, np.float32(samples.scale)
     if band is None:
-        return DistanceField(surfaces.values * scale, origin, cell, sdf=sdf)
+        return DistanceField(surfaces.values * scale, origin, cell, sdf=sdf, near=near)
     blocks = trimmed(surfaces.values, band * grid.spacing).map(lambda u: u * scale)
-    return BandedField(blocks, origin, cell, band * cell, sdf, feet.in_cells(grid))
+    return BandedField(blocks, origin, cell, band * cell, sdf, feet.in_cells(grid), near)
 
 
 class _Stages:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .field.distance_field import BandedField, DistanceField
-from .field.integration import NearBand
 from .surface.mesh import Mesh
 
 
@@ -21,7 +20,6 @@ class Reconstruction:
     surface      : Mesh, closed: the double cover, or where the setting `surface` is "signed" the boundary of the
                    inside, wound outwards; None where it is "single" or "none"
     sheet        : Mesh, the single layer, where the setting `surface` is "single" or "both"; else None
-    near         : NearBand, the nodes near the surface and the steps to them from their foot points
     report       : dict, JSON-ready: settings, counts, seconds per stage, peak memory, warnings
     """
 
@@ -32,5 +30,4 @@ class Reconstruction:
     field: DistanceField | BandedField
     surface: Mesh | None
     sheet: Mesh | None
-    near: NearBand
     report: dict

@@ -27,7 +27,7 @@ PACKAGES = [
     "python3-zstandard",
 ]
 SCREEN = "1600x1000x24"
-SECONDS_PER_CASE = 600
+SECONDS_PER_CASE = 300
 
 
 class Unavailable(Exception):

@@ -72,7 +72,6 @@ class VAD_PT_last_run(_Sidebar, bpy.types.Panel):
             lines.label(text=line, icon="BLANK1")
         for warning in results.warnings(result):
             draw_message(self.layout, warning, "ERROR")
-        self.layout.operator(stages.VAD_OT_reextract.bl_idname, icon="FILE_REFRESH")
 
 
 class VAD_PT_look(_Sidebar, bpy.types.Panel):
@@ -91,6 +90,7 @@ class VAD_PT_look(_Sidebar, bpy.types.Panel):
             if obj is not None and obj.name in layer.objects:
                 shown = not obj.hide_get()
                 row.operator(extras.VAD_OT_show.bl_idname, text=name, depress=shown).role = role
+        self.layout.operator(stages.VAD_OT_reextract.bl_idname, icon="FILE_REFRESH")
         column = self.layout.column(align=True)
         column.operator(extras.VAD_OT_shell.bl_idname, icon="MOD_SOLIDIFY")
         column.operator(extras.VAD_OT_slice.bl_idname, icon="MOD_BOOLEAN")

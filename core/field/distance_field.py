@@ -8,6 +8,7 @@ from scipy.ndimage import map_coordinates
 from ..errors import VADError
 from .blocks import Blocks
 from .feet import Feet
+from .steps import NearBand
 
 _WHOLE = 1 << 27  # nodes, the most that a band's values are laid out in the whole box for
 _CHUNK = 1 << 17  # queries
@@ -19,11 +20,16 @@ class _OnGrid:
     """What both kinds of field share. Node (i,j,k) lies at ``origin + spacing * (i,j,k)``."""
 
     def sample(self, x) -> np.ndarray:
-        """Distance at points `x`, (m,3) -> (m,) float64: trilinear where there are values; outside the box, the value
-        at the nearest point of the box plus the distance to that point."""
+        """Distance at points `x`, (m,3) -> (m,) float64: trilinear where there are values, next to the surface of an
+        unsigned field by the steps `near` (see :meth:`NearBand.distances`); outside the box, the value at the nearest
+        point of the box plus the distance to that point."""
         cells = (np.asarray(x, np.float64) - self.origin) / self.spacing
         inside = np.clip(cells, 0, np.array(self.shape) - 1)
-        return self._inside(inside) + self.spacing * np.linalg.norm(cells - inside, axis=1)
+        found = self._inside(inside)
+        if self.near is not None and not self.sdf:
+            row, distance = self.near.distances(inside, self.shape, self.spacing)
+            found[row] = distance
+        return found + self.spacing * np.linalg.norm(cells - inside, axis=1)
 
     def gradient(self, x) -> np.ndarray:
         """Unit-free gradient of :meth:`sample` at `x`, (m,3) -> (m,3) float64, central differences of half a cell."""
@@ -42,6 +48,7 @@ class DistanceField(_OnGrid):
     spacing : float, one cell
     band    : float, half width of the band that holds values (input units); inf where the whole box does
     sdf     : True when the values are signed (negative inside)
+    near    : NearBand in input units, the nodes next to the surface and the steps to them, or None
     """
 
     values: np.ndarray
@@ -49,6 +56,7 @@ class DistanceField(_OnGrid):
     spacing: float
     band: float = np.inf
     sdf: bool = False
+    near: NearBand | None = None
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -70,6 +78,7 @@ class BandedField(_OnGrid):
     origin  : (3,) float64     spacing : float, one cell     band : float, half width of the band, input units
     sdf     : True when the values are signed (negative inside)
     feet    : Feet in cells from the origin
+    near    : NearBand in input units, the nodes next to the surface and the steps to them, or None
     """
 
     blocks: Blocks
@@ -78,6 +87,7 @@ class BandedField(_OnGrid):
     band: float
     sdf: bool
     feet: Feet
+    near: NearBand | None = None
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -7,7 +7,6 @@ errs less, most of all at the medial axis, and needs no linear solve: every node
 (vector distance propagation; P.-E. Danielsson, Computer Graphics and Image Processing 14, 1980).
 """
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -20,26 +19,11 @@ from .feet import settled_feet
 from .grid import Grid
 from .local_surface import LocalSurface
 from .poisson import poisson
+from .steps import NearBand
 
 BAND = 2.0  # cells, where the projection distance itself is kept
 _ROUNDS = 2
 _SLAB = 1 << 17  # nodes
-
-
-@dataclass(frozen=True)
-class NearBand:
-    """The nodes within BAND cells of the surface.
-
-    node : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
-    """
-
-    node: np.ndarray
-    step: np.ndarray
-
-    def rows(self, node: np.ndarray) -> np.ndarray:
-        """Where nodes (m,) stand in the band, -1 for those that do not."""
-        row = np.minimum(np.searchsorted(self.node, node), len(self.node) - 1)
-        return np.where(self.node[row] == node, row, -1)
 
 
 def distance_field(

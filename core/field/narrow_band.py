@@ -12,8 +12,9 @@ from ..progress import Progress
 from .blocks import SIDE, Blocks, blocks_of, table_shape
 from .feet import Feet, settled_feet
 from .grid import Grid
-from .integration import BAND, NearBand, sample_reach
+from .integration import BAND, sample_reach
 from .local_surface import LocalSurface, Projection
+from .steps import NearBand
 
 _HALF = 0.5 * np.sqrt(3)  # cells, from the middle of a group of 2^3 nodes to each of them
 _MARGIN = 1.0  # cells, by which a projection may err in leaving a group out
@@ -125,7 +126,7 @@ def _around(surface, grid, width, corner, sample, feet, progress):
     background = np.float32(width * grid.spacing)
     block = np.unique(np.ravel_multi_index(tuple((corner // SIDE).T), table))
     values = blocks_of(grid.shape, block, background)
-    for rows in progress.chunks(len(corner), _PIECE):
+    for rows in progress.chunks(len(corner), _PIECE // 4):
         part, own = corner[rows], sample[rows]
         away = np.linalg.norm(_middles(grid, part, 2) - surface.points[own], axis=1)
         foot, _ = feet.tree.query(_middles(grid, part, 2), workers=-1)

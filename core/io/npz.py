@@ -31,7 +31,7 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
 
     Raises :class:`VADError` where the file cannot be written whole.
     """
-    field, near = result.field, result.near
+    field, near = result.field, result.field.near
     length = np.linalg.norm(near.step, axis=1, keepdims=True)
     node = np.stack(np.unravel_index(near.node, field.shape), axis=1)
     if isinstance(field, BandedField):

@@ -19,6 +19,7 @@ def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarr
         )
     axes, confidence = axes[source_index], confidence[source_index]
     length = np.linalg.norm(axes, axis=1)
-    if not (np.isfinite(length) & (length > 0)).all():
-        raise InputError(f"{int((~(length > 0)).sum())} known normals have no direction; give finite non-zero axes")
+    useless = ~(np.isfinite(length) & (length > 0))
+    if useless.any():
+        raise InputError(f"{int(useless.sum())} known normals have no direction; give finite non-zero axes")
     return axes / length[:, None], np.clip(confidence, 0.0, 1.0)

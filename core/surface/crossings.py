@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.grid import Grid
-from ..field.integration import NearBand
 from ..field.local_surface import LocalSurface
+from ..field.steps import NearBand
 from ..linalg import principal_axes
 from .mending import mend
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from ..field.blocks import Blocks
 from ..field.grid import Grid
-from ..field.integration import NearBand
 from ..field.local_surface import LocalSurface
+from ..field.steps import NearBand
 from ..progress import Progress
 from ..settings import Settings
 from .crossings import find_crossings

@@ -1,6 +1,7 @@
 """Registering is reversible, and says what to do where SciPy is missing."""
 
 import sys
+import types
 
 import pytest
 
@@ -50,15 +51,17 @@ class Layout:
 
     row = column
 
-    def label(self, text, icon="NONE"):
+    def label(self, text="", icon="NONE"):
         self.texts.append(text)
 
     def prop(self, data, name):
         assert name in data.bl_rna.properties
         self.props.append(name)
 
-    def operator(self, name, icon="NONE"):
+    def operator(self, name, icon="NONE", text="", depress=False):
         self.operators.append(name)
+        self.texts += [f"[{text}]" if depress else text] if text else []
+        return types.SimpleNamespace()
 
 
 def drawn(bpy, extension, name, module="panel"):
@@ -107,3 +110,12 @@ def test_the_tab_sums_up_the_last_run_with_its_warnings(blender, extension):
         "wrong on the way",
         "and more",
     ]
+
+
+def test_the_tab_shows_and_hides_what_there_is(blender, extension, add_mesh, sphere):
+    add_mesh("Scan", sphere)
+    assert not extension("vad_addon.panel").VAD_PT_look.poll(blender.context)
+    blender.ops.vad.reconstruct(resolution=16)
+    layout = drawn(blender, extension, "VAD_PT_look")
+    assert layout.texts == ["[Surface]", "Field", "Points", "[Scan]"]
+    assert layout.operators[:5] == ["vad.show"] * 4 + ["vad.reextract"]

@@ -151,7 +151,7 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2):
         "wires": {"points": 1000, "share": 0.05, "found": 0.0, "lost": 0.0},
         "silences": {"clean": {"cleaning": {"looks": 3, "seconds": 0.4, "cpu": silence}}},
         "noise": rows,
-        "categories": dict.fromkeys(CASES, "closed"),
+        "categories": dict.fromkeys(CASES, "watertight"),
     }
 
 

@@ -11,7 +11,7 @@ import pytest
 from plyfile import PlyData
 
 from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
-from core.field.integration import NearBand
+from core.field.steps import NearBand
 from core.io.openvdb_module import load_openvdb
 from core.io.points import read_points
 from core.settings import default_in_words, options
@@ -49,10 +49,15 @@ def calls(monkeypatch):
             np.arange(4),
             np.eye(4, 3),
             np.ones(4),
-            DistanceField(np.ones((4, 4, 4), np.float32), np.zeros(3), 0.25, sdf=settings.surface == "signed"),
+            DistanceField(
+                np.ones((4, 4, 4), np.float32),
+                np.zeros(3),
+                0.25,
+                sdf=settings.surface == "signed",
+                near=NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]])),
+            ),
             mesh if settings.surface in ("double", "both", "signed") else None,
             mesh if settings.surface in ("single", "both") else None,
-            NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]])),
             REPORT,
         )
 
@@ -243,6 +248,15 @@ def test_help(capsys, arguments):
         assert f"--{name.replace(chr(95), chr(45))}" in text
         assert field.metadata["help"][:30] in text
         assert f"default {default_in_words(field)}" in text
+
+
+def test_info_knows_of_the_band(capsys, scan):
+    fine = "info", scan, "--resolution", 512, "--json"
+    whole, band = (json.loads(run(capsys, *fine, *more)[1]) for more in ([], ["--band", 4]))
+    assert (whole["band"], band["band"]) == (None, 4.0)
+    assert band["estimate"]["memory_mb"] < whole["estimate"]["memory_mb"] / 3
+    assert "those within 4 cells of the surface alone" in run(capsys, "info", scan, "--band", 4)[1]
+    assert "set band" in refused(capsys, "info", scan, "--resolution", 1024)
 
 
 def test_info_counts_and_measures(capsys, tmp_path):

@@ -39,10 +39,10 @@ def banded():
 def test_values_are_those_of_the_whole_box(points):
     run, whole = (reconstruct(points, Settings(resolution=40, band=b, surface="none")) for b in (CELLS, None))
     cell = whole.field.spacing
-    np.testing.assert_array_equal(run.near.node, whole.near.node)
+    np.testing.assert_array_equal(run.field.near.node, whole.field.near.node)
     found, expected = run.field.values, whole.field.values
     assert (found.shape, found.dtype) == (expected.shape, np.float32)
-    np.testing.assert_array_equal(found.flat[run.near.node], expected.flat[run.near.node])
+    np.testing.assert_array_equal(found.flat[run.field.near.node], expected.flat[run.field.near.node])
     off = np.abs(found - np.minimum(expected, run.field.band)) / cell
     assert off.mean() < 0.02
     assert np.percentile(off, 99.9) < 0.5

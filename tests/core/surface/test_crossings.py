@@ -5,8 +5,9 @@ import pytest
 
 from core import Cancelled
 from core.field.grid import Grid
-from core.field.integration import BAND, NearBand
+from core.field.integration import BAND
 from core.field.local_surface import fit_local_surface
+from core.field.steps import NearBand
 from core.points import local_spacing
 from core.surface.crossings import _HAIR, Crossings, find_crossings, node_strides
 from tests import shapes

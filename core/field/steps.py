@@ -1,0 +1,52 @@
+"""Steps from the surface to the nodes next to it: there not only the distance is known but also the way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
+_TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point at each other
+
+
+@dataclass(frozen=True)
+class NearBand:
+    """The nodes within two cells of the surface.
+
+    node : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
+    """
+
+    node: np.ndarray
+    step: np.ndarray
+
+    def rows(self, node: np.ndarray) -> np.ndarray:
+        """Where nodes (m,) stand in the band, -1 for those that do not."""
+        if not len(self.node):
+            return np.full(node.shape, -1)
+        row = np.minimum(np.searchsorted(self.node, node), len(self.node) - 1)
+        return np.where(self.node[row] == node, row, -1)
+
+    def distances(
+        self, cells: np.ndarray, shape: tuple[int, int, int], spacing: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Distances between the nodes of a grid of `shape`, at those of the positions `cells` (m,3), in cells and inside
+        the grid, whose eight corners lie in the band: their rows (r,) and the distances there (r,) float64.
+
+        An unsigned distance has a kink on the surface, where a trilinear reading of the nodes' values gives a third of
+        a cell instead of zero. The step from the foot point, the gradient of u^2 / 2, has none (Ambrosio and
+        Mantegazza, J. Geom. Anal. 8, 1998): it is read trilinearly, and its length is the distance.
+
+        Midway between two sheets it is the step that jumps, from one foot point to the other, and its mean would be a
+        sheet that is not there. Steps of neighbouring nodes point at each other there; such cells are left out.
+        """
+        lowest = np.clip(np.floor(cells).astype(np.int64), 0, np.array(shape) - 2)
+        strides = np.array([shape[1] * shape[2], shape[2], 1])
+        row = self.rows((lowest @ strides)[:, None] + _CORNERS @ strides)
+        chosen = np.flatnonzero((row >= 0).all(axis=1))
+        corner = self.step[row[chosen]].reshape(-1, 2, 2, 2, 3)
+        apart = [np.diff(corner[..., axis], axis=1 + axis).reshape(len(chosen), 4) for axis in range(3)]
+        divergent = np.min(apart, axis=(0, 2)) >= -_TOWARDS * spacing
+        chosen, blend = chosen[divergent], corner[divergent]
+        for axis, share in enumerate((cells[chosen] - lowest[chosen]).T):
+            share = share.reshape(-1, *[1] * (blend.ndim - 2))
+            blend = (1 - share) * blend[:, 0] + share * blend[:, 1]
+        return chosen, np.sqrt(np.einsum("mi,mi->m", blend, blend))

@@ -1,0 +1,88 @@
+"""Distances read between the nodes, against closed forms."""
+
+import numpy as np
+import pytest
+
+from core import Settings, reconstruct
+from core.field.steps import NearBand
+from tests import shapes
+
+SHAPE = (24, 20, 28)
+
+
+def band(foot_of, width=2.0):
+    """Nodes of the grid within `width` cells of a surface given by its foot points, and the steps to them."""
+    nodes = np.indices(SHAPE).reshape(3, -1).T.astype(float)
+    step = nodes - foot_of(nodes)
+    near = np.flatnonzero(np.linalg.norm(step, axis=1) <= width)
+    return NearBand(near, step[near])
+
+
+def onto_plane(normal, offset):
+    normal = np.array(normal) / np.linalg.norm(normal)
+    return lambda x: x - (x @ normal - offset)[:, None] * normal
+
+
+def positions(seed=0, count=4000):
+    return np.random.default_rng(seed).uniform(0, np.array(SHAPE) - 1, (count, 3))
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 2, 3)])
+def test_plane_is_exact_on_and_off_the_surface(normal):
+    foot = onto_plane(normal, 9.3)
+    x = np.concatenate([positions(), foot(positions(1))])
+    x = x[((x >= 0) & (x <= np.array(SHAPE) - 1)).all(axis=1)]
+    true = np.linalg.norm(x - foot(x), axis=1)
+    row, distance = band(foot).distances(x, SHAPE, 1.0)
+    assert np.isin(np.flatnonzero(true < 0.2), row).all()
+    np.testing.assert_allclose(distance, true[row], atol=1e-9)
+
+
+def test_straight_rim_and_single_point_are_exact():
+    rim = lambda x: np.stack([x[:, 0], np.full(len(x), 9.4), np.full(len(x), 13.7)], axis=1)  # noqa: E731
+    point = lambda x: np.tile([11.2, 9.4, 13.7], (len(x), 1))  # noqa: E731
+    for foot in (rim, point):
+        x = positions(count=40000)
+        row, distance = band(foot).distances(x, SHAPE, 1.0)
+        assert len(row) > 20
+        np.testing.assert_allclose(distance, np.linalg.norm(x - foot(x), axis=1)[row], atol=1e-9)
+
+
+def test_sphere_errs_by_the_square_of_a_cell():
+    centre, radius = np.array([11.5, 9.5, 13.5]), 7.0
+    foot = lambda x: centre + radius * (x - centre) / np.linalg.norm(x - centre, axis=1, keepdims=True)  # noqa: E731
+    x = foot(positions())
+    row, distance = band(foot).distances(x, SHAPE, 1.0)
+    assert len(row) > 0.99 * len(x)
+    assert distance.max() < 1 / radius
+    assert distance.mean() < 0.25 / radius
+
+
+@pytest.mark.parametrize("gap", [2.0, 2.5, 3.5])
+def test_no_sheet_appears_midway_between_two(gap):
+    low, high = 13.0 - gap / 2, 13.0 + gap / 2
+
+    def foot(x):
+        return np.column_stack([x[:, :2], np.where(x[:, 2] < 13.2, low, high)])
+
+    x = positions()
+    x[:, 2] = np.random.default_rng(2).uniform(low - 1, high + 1, len(x))
+    true = np.minimum(np.abs(x[:, 2] - low), np.abs(x[:, 2] - high))
+    row, distance = band(foot).distances(x, SHAPE, 1.0)
+    assert np.abs(distance - true[row]).max() < 0.5
+
+
+def test_positions_away_from_the_band_are_left_out():
+    row, _ = band(onto_plane((0, 0, 1), 5.0)).distances(positions(), SHAPE, 1.0)
+    assert len(row) and (np.abs(positions()[row, 2] - 5.0) < 3).all()
+    assert not len(NearBand(np.empty(0, np.int64), np.empty((0, 3))).distances(positions(), SHAPE, 1.0)[0])
+
+
+@pytest.mark.parametrize("band", [None, 4])
+def test_a_field_is_zero_on_its_surface_and_stays_a_distance_beside_it(band):
+    points = shapes.sphere(1500)
+    field = reconstruct(3 * points + 7, Settings(resolution=40, surface="none", band=band)).field
+    on = 3 * shapes.scattered_sphere(1000) + 7
+    assert field.sample(on).mean() < 0.02 * field.spacing
+    off = 7 + (on - 7) * np.random.default_rng(0).uniform(0.9, 1.1, (1000, 1))
+    np.testing.assert_allclose(field.sample(off), np.abs(np.linalg.norm(off - 7, axis=1) - 3), atol=0.1 * field.spacing)
