@@ -276,7 +276,7 @@ def verdicts(measured: dict) -> Iterator[str]:
     behind = [_place(row) for row in measured["noise"] if row["ours"]["nc"] < row["pca"]["nc"]]
     yield f"NC is below that of the best PCA on {len(behind)} of {len(measured['noise'])} rows: {_listed(behind)}."
     behind = [_place(row) for row in measured["noise"] if row["ours"]["after"] > row["alternating"]["after"]]
-    yield f"The paper's alternation leaves the points closer to the surface on {_listed(behind)}."
+    yield f"The paper's alternation leaves the points closer to the surface on {', '.join(behind) or 'no row'}."
     clean = {row["case"]: row["cd"] for row in measured["strays"] if not row["share"]}
     ratio = {row["case"]: row["cd"] / clean[row["case"]] for row in measured["strays"] if row["share"] == 0.05}
     worst = max(ratio, key=ratio.get)

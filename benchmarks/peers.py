@@ -60,7 +60,7 @@ class Peer:
 
     title    : for tables     how : what is run, in a sentence
     module   : the library it needs
-    prepare  : points (n,3) -> whatever all variants start from
+    prepare  : points (n,3) -> whatever all variants start from; peers that share it run in one process
     finish   : (that, variant) -> Mesh
     variants : values of its parameter to choose from; (None,) where it has none
     unit     : what the parameter is
@@ -86,6 +86,10 @@ def _oriented(points):
     cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(_PCA_NEIGHBOURS))
     cloud.orient_normals_consistent_tangent_plane(_ORIENTATION_NEIGHBOURS)
     return cloud
+
+
+def _poisson_from(points):
+    return _screened_poisson(_oriented(points))
 
 
 def _screened_poisson(cloud):
@@ -156,14 +160,14 @@ PEERS = {
         "Poisson",
         f"Open3D: {_NORMALS}, screened Poisson reconstruction at depth {_DEPTH}",
         "open3d",
-        lambda points: _screened_poisson(_oriented(points)),
+        _poisson_from,
         lambda poisson, _: _mesh(poisson[0]),
     ),
     "trimmed": Peer(
         "Poisson, trimmed",
         "the same, without the vertices of least density",
         "open3d",
-        lambda points: _screened_poisson(_oriented(points)),
+        _poisson_from,
         _trim,
         (0.01, 0.03, 0.1, 0.2, 0.4),
         "share of vertices dropped",

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from multiprocessing import get_context
 
 _WARM = "forkserver" if sys.platform != "win32" else "spawn"
-_LOADED_ONCE = ["open3d", "benchmarks.measure_peer"]
+_LOADED_ONCE = ["open3d", "benchmarks.measure_peers"]
 
 
 class Failed(Exception):

@@ -56,7 +56,7 @@ so only the latter are worth comparing, and only within a run.
 - **Against the peers**: the same points, errors measured alike. *NC* here is that of the surface: mean |n·n\\*| of the
   triangles at those 200 000 points and at their closest points on the other mesh, both ways. *seconds*: by the clock,
   {timing}, and *CPU*: of all threads together, which feels other work on the machine less. *MB*: what the run adds to
-  the memory of a process of its own, libraries not included. Parameters
+  the memory of a process of its own (Poisson's two share one), libraries not included. Parameters
   of the peers come from a stated set and are **the best for each case, chosen with the truth at hand**, which favours
   them; ours are the defaults. *Clean* are cases without noise, strays, holes or wires. Scale-space
   reconstruction is not in CGAL's Python package and so is missing. Poisson closes open surfaces by design, and needs an

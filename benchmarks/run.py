@@ -11,7 +11,7 @@ from . import peers
 from .against import best_peer
 from .cases import load_case
 from .field_metrics import field_errors, past_rims
-from .measure_peer import measure_peer
+from .measure_peers import measure_peers
 from .metrics import cover_euler, normal_agreement, surface_errors, topology, triangle_quality
 from .processes import Failed, run_fresh, run_warm
 
@@ -21,7 +21,7 @@ PEER_LIMIT = 600.0  # seconds, all variants together
 def run_cases(
     paths: list[Path], sampling: str, settings: Settings, with_peers: bool, repeats: int = 1
 ) -> Iterator[dict]:
-    """Results case by case. We and each peer run in a process of our own; one that fails yields its name and the
+    """Results case by case. We and the peers run in processes of our own; one that fails yields its name and the
     error."""
     for path in paths:
         try:
@@ -38,14 +38,16 @@ def run_cases(
 
 
 def run_peers(path: Path, sampling: str, repeats: int = 1) -> dict[str, dict]:
-    """:func:`measure_peer` of all that are installed, by name; one that fails has only the key `error`."""
-    measured = {}
+    """What :func:`measure_peers` finds of all that are installed, by name; one that fails has only the key `error`."""
+    groups, measured = {}, {}
     for name, peer in peers.PEERS.items():
         if peer.available:
-            try:
-                measured[name] = run_warm(measure_peer, name, path, sampling, repeats, limit=PEER_LIMIT)
-            except Failed as error:
-                measured[name] = {"error": str(error)}
+            groups.setdefault(peer.prepare, []).append(name)
+    for names in groups.values():
+        try:
+            measured |= run_warm(measure_peers, names, path, sampling, repeats, limit=PEER_LIMIT)
+        except Failed as error:
+            measured |= {name: {"error": str(error)} for name in names}
     return measured
 
 

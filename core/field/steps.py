@@ -28,8 +28,8 @@ class NearBand:
     def distances(
         self, cells: np.ndarray, shape: tuple[int, int, int], spacing: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Distances between the nodes of a grid of `shape`, at those of the positions `cells` (m,3), in cells and inside
-        the grid, whose eight corners lie in the band: their rows (r,) and the distances there (r,) float64.
+        """Distances between the nodes of a grid of `shape`, at those of the positions `cells` (m,3), in cells and
+        inside the grid, whose eight corners lie in the band: their rows (r,) and the distances there (r,) float64.
 
         An unsigned distance has a kink on the surface, where a trilinear reading of the nodes' values gives a third of
         a cell instead of zero. The step from the foot point, the gradient of u^2 / 2, has none (Ambrosio and
@@ -46,7 +46,7 @@ class NearBand:
         apart = [np.diff(corner[..., axis], axis=1 + axis).reshape(len(chosen), 4) for axis in range(3)]
         divergent = np.min(apart, axis=(0, 2)) >= -_TOWARDS * spacing
         chosen, blend = chosen[divergent], corner[divergent]
-        for axis, share in enumerate((cells[chosen] - lowest[chosen]).T):
+        for share in (cells[chosen] - lowest[chosen]).T:
             share = share.reshape(-1, *[1] * (blend.ndim - 2))
             blend = (1 - share) * blend[:, 0] + share * blend[:, 1]
         return chosen, np.sqrt(np.einsum("mi,mi->m", blend, blend))

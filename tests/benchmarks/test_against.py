@@ -1,14 +1,16 @@
 """What a comparison adds up to, on made-up results; and each peer that is installed, on a sphere."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from benchmarks.against import best_peer, full_table, overview, peer_tables, verdicts
-from benchmarks.measure_peer import measure_peer
+from benchmarks.measure_peers import measure_peers
 from benchmarks.peers import PEERS
 from benchmarks.run import run_peers
+from core import Mesh
 
 
 def measures(cd, **more):
@@ -85,11 +87,32 @@ def ball(tmp_path_factory):
 @pytest.mark.parametrize("name", PEERS)
 def test_a_peer_meshes_a_sphere(name, ball):
     pytest.importorskip(PEERS[name].module)
-    found = measure_peer(name, ball, "uniform", 1)
+    found = measure_peers([name], ball, "uniform", 2)[name]
     assert found["cd"] < 5
     assert found["nc"] > 0.95
     assert found["seconds"] > 0
     assert found["variant"] in PEERS[name].variants
+
+
+def test_one_peers_failure_leaves_the_others(ball, monkeypatch):
+    def broken(_, variant):
+        raise RuntimeError("no")
+
+    whole = PEERS["front"]
+    made = {"a": whole, "b": replace(whole, finish=broken), "c": replace(whole, finish=lambda *_: Mesh(*_EMPTY))}
+    working = replace(whole, prepare=lambda points: points, finish=lambda points, _: _pyramid(points))
+    monkeypatch.setattr("benchmarks.measure_peers.PEERS", made | {"a": working})
+    found = measure_peers(["a", "b", "c"], ball, "uniform", 1)
+    assert found["a"]["cd"] > 1
+    assert found["b"] == {"error": "RuntimeError: no"}
+    assert found["c"] == {"error": "ValueError: it made no triangle"}
+
+
+_EMPTY = np.empty((0, 3)), np.empty((0, 3), np.int32)
+
+
+def _pyramid(points):
+    return Mesh(points[[0, 200, 400, 600]], np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]], np.int32))
 
 
 def test_peers_that_are_not_installed_are_left_out(ball, monkeypatch):

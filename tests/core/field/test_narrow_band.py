@@ -10,6 +10,7 @@ from core.field.integration import BAND, distance_field
 from core.field.local_surface import fit_local_surface
 from core.field.narrow_band import banded_field, trimmed
 from core.points import local_spacing
+from core.surface.extract import band_for
 from tests import shapes
 
 CELLS = 4.0
@@ -86,6 +87,17 @@ def test_a_bridged_opening_is_spanned_as_in_the_whole_box():
     assert run.surface.vertices[:, 2].max() > 0.9
 
 
+@pytest.mark.parametrize(("kind", "wider"), [("none", 0), ("double", 0), ("single", 1), ("both", 1), ("signed", 1)])
+def test_telling_sides_takes_distances_beyond_the_band(ball, kind, wider):
+    """Regions start at up to half the bridging length; their neighbours are looked at, too."""
+    grid = fit_grid(ball.points, 64)
+    reach = 1.5 * np.median(ball.spacing) / grid.spacing
+    assert 3.5 < reach < 6
+    found = band_for(Settings(band=3, surface=kind), ball, grid)
+    assert reach + 1 < found < reach + 2 if wider else found == 3
+    assert band_for(Settings(band=12, surface=kind), ball, grid) == 12
+
+
 def test_sampling_is_that_of_the_whole_box_in_and_out_of_the_band(banded, sphere_run, random):
     x = random.uniform(-1.2, 1.2, (4000, 3))
     run = banded["sphere"]
@@ -159,6 +171,7 @@ def test_trimming_cuts_off_and_stores_less(ball):
     wide, narrow = banded_field(ball, grid, 8.0)[0], banded_field(ball, grid, 3.0)[0]
     cut = trimmed(wide, 3.0 * grid.spacing)
     assert cut.size < wide.size
+    assert (wide.stored < np.float32(8.0 * grid.spacing)).any(axis=(1, 2, 3)).all()
     np.testing.assert_allclose(cut.dense(), narrow.dense(), atol=1e-6)
 
 
