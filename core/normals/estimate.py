@@ -93,7 +93,7 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
     aimless = ~(np.isfinite(largest) & (largest > 0))
     if aimless.any():
         raise InputError(f"{aimless.sum()} constraint axes have no direction; give finite non-zero axes")
-    axes = axes / largest[:, None]
+    axes = np.ldexp(axes, -np.frexp(largest)[1][:, None])  # exact, and no square over- or underflows
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     position = np.full(count, -1)
     position[source_index] = np.arange(len(source_index))

@@ -24,35 +24,35 @@ def patches(progress):
 
 
 STAGES = {
-    "spacing": ([(core_points, "_CHUNK", CHUNK)], lambda progress: (local_spacing(POINTS, progress),), 1),
-    "outliers": (
-        [(outliers, "_CHUNK", CHUNK), (quadrics, "_CHUNK", CHUNK * 20)],
-        lambda progress: (outliers.find_outliers(DIRTY, progress),),
-        3,
-    ),
-    "denoising": (
-        [(quadrics, "_CHUNK", CHUNK * 50)],
-        lambda progress: (denoise(NOISY, SPACING, 1.0, progress=progress)[0],),
-        4,
-    ),
-    "patches": (
-        [(curvature, "_CHUNK", CHUNK), (borders, "_CHUNK", CHUNK), (local_surface, "_CHUNK", CHUNK)],
-        patches,
-        3,
-    ),
+    "spacing": lambda progress: (local_spacing(POINTS, progress),),
+    "outliers": lambda progress: (outliers.find_outliers(DIRTY, progress),),
+    "denoising": lambda progress: (denoise(NOISY, SPACING, 1.0, progress=progress)[0],),
+    "patches": patches,
 }
 
 
-@pytest.mark.parametrize("stage", STAGES)
-def test_looks_grow_with_the_samples_and_change_nothing(stage, monkeypatch):
-    chunks, run, passes = STAGES[stage]
-    whole = run(None)
-    for module, name, size in chunks:
-        monkeypatch.setattr(module, name, size)
+def looks_and_results(stage):
     looks = []
-    parts = run(lambda fraction, text: looks.append(fraction))
-    assert len(looks) >= passes * N // CHUNK
-    assert looks == sorted(looks)
-    assert 0 <= looks[0] <= looks[-1] <= 1
+    return looks, STAGES[stage](lambda fraction, text: looks.append(fraction))
+
+
+@pytest.mark.parametrize(
+    ("stage", "module", "name", "size"),
+    [
+        ("spacing", core_points, "_CHUNK", CHUNK),
+        ("outliers", outliers, "_CHUNK", CHUNK),
+        ("denoising", quadrics, "_CHUNK", 12 * CHUNK),
+        ("patches", local_surface, "_CHUNK", CHUNK),
+        ("patches", curvature, "_CHUNK", CHUNK),
+        ("patches", borders, "_CHUNK", CHUNK),
+    ],
+)
+def test_looks_grow_with_the_samples_and_change_nothing(stage, module, name, size, monkeypatch):
+    few, whole = looks_and_results(stage)
+    monkeypatch.setattr(module, name, size)
+    many, parts = looks_and_results(stage)
+    assert len(many) >= len(few) + N // CHUNK - 1
+    assert many == sorted(many)
+    assert 0 <= many[0] <= many[-1] <= 1
     for expected, found in zip(whole, parts, strict=True):
         np.testing.assert_array_equal(found, expected)

@@ -54,6 +54,13 @@ def test_what_is_rough_in_a_small_place_may_be_detail():
     assert not noisy_samples(points, local_spacing(points)).any()
 
 
+def test_what_is_faint_in_one_half_may_be_detail():
+    points = shapes.torus(2000)
+    half = points[:, 0] > 0
+    points[half] = noisy(points[half], 0.15 * np.median(local_spacing(points)))
+    assert not noisy_samples(points, local_spacing(points)).any()
+
+
 def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():
     ring = shapes.torus(6000, major=1.0, minor=0.15)
     few, many = (np.median(estimate_noise(noisy(ring, deviation)).neighbours) for deviation in (0.002, 0.02))
