@@ -52,7 +52,8 @@ costs, most of it at the kink of u on the surface, is the last column: exact dis
 the nodes themselves all compare alike.
 
 - *ours*: the default. *Poisson*: the paper's integration (`integration="poisson"`). *grid*: the same with the paper's
-  diffusion on the grid (`diffusion="grid"`), a dash where the grid or float64 cannot hold it.
+  diffusion on the grid (`diffusion="grid"`), a dash where the grid or float64 cannot hold it. Its axes are those of the
+  nearest samples wherever they are carried, past rims and sharp edges too, where the direction to the surface differs.
 - *no diffusion*: the paper's projection field, the distance to the tangent plane of the nearest sample, our normals.
 - *nearest*: the nearest sample. *planes*: the tangent plane of the nearest sample, by PCA over 12 neighbours.
   *blended*: the Gaussian-weighted mean of the 12 nearest planes.
@@ -100,7 +101,7 @@ u / d at 4, 8 and 16 cells past the true rim, up to 60 degrees off the sheet: me
 95th percentile. *nearest* is the mean of the distance to the nearest sample over d: what it exceeds 1 by is the strip
 between the outermost samples and the true rim, which no method sees. *rim sampled too* has further samples on the true
 rim, as far apart as the others: what is left there is the method's own. It lets a sheet go on for a quarter of the
-local spacing past its last samples, which on average is where the true rim lies when the rim itself is not sampled.
+local spacing past its last samples, which on average is a little past the true rim where that is not sampled itself.
 
 {rims}
 
@@ -118,8 +119,8 @@ local spacing less. *rims*: what is kept, the default; *Poisson*: the same rims 
 Median angle between the axes Y_f of the grid's screened Poisson equations and of the closed-form kernels, around a
 torus with true normals. *sqrt(t)*: in cells. *near*: within two local spacings; *held*: up to 33 sqrt(t) from the
 points; *lost*: beyond 40, where the solution has drowned in the rounding of float64. At the paper's t = h², 10,000
-points on a box of 128 cells make sqrt(t) about half a cell and leave much of the box beyond 33 sqrt(t), so
-`diffusion="grid"` refuses them.
+points on a box of 128 cells make sqrt(t) little more than half a cell and mostly leave much of the box beyond 33
+sqrt(t), where `diffusion="grid"` refuses.
 
 {agreement}
 

@@ -77,7 +77,7 @@ class Settings:
     diffusion: str = _option(
         "kernel",
         "Where that equation takes its directions from: the diffusion's closed-form kernels, or the published "
-        "diffusion on the grid (the reference; without rims, and for few points only, up to about 2,000)",
+        "diffusion on the grid (the reference; without rims, and refused where points are many, mostly above 2,000)",
         choices=("kernel", "grid"),
     )
     backend: str = _option(

@@ -1,0 +1,55 @@
+"""The page on large grids says what was measured, and no more."""
+
+import json
+
+import pytest
+
+from benchmarks import scale
+from benchmarks.scale import COUNTS, POINTS, RUNS, verdicts, write_page
+
+
+def made_up():
+    """Runs whose CPU time grows as resolution^2 and points^0.5, and whose estimates are a tenth too high."""
+    runs = []
+    for points, resolution, band, surface in RUNS:
+        cpu = resolution**2 * points**0.5 / 1e6
+        peak = resolution**2 / 400
+        runs.append(
+            dict(points=points, resolution=resolution, band=band, surface=surface, seconds=cpu, cpu=cpu)
+            | dict(field_cpu=cpu / 2, peak_memory_mb=peak, nodes=10, box=1000, faces=7)
+            | dict(estimate=dict(seconds=1.0, memory_mb=1.1 * peak))
+        )
+    peers = [dict(points=count, seconds=1.0, cpu=2.0, peak_memory_mb=50.0) for count in COUNTS]
+    return {"versions": {"Python": "3"}, "runs": runs, "open3d": peers}
+
+
+def test_the_page_shows_every_run_and_the_growth(tmp_path):
+    text = write_page(made_up(), tmp_path).read_text()
+    assert json.loads((tmp_path / "scale" / "numbers.json").read_text())["versions"] == {"Python": "3"}
+    assert text.count("| double |") == sum(surface == "double" for *_, surface in RUNS)
+    assert "power of **2.00** (field) and **2.00** (whole run)" in text
+    assert "number of points to the power of **0.50**" in text
+    assert "| 1024^3 | 4 |" in text
+
+
+def test_verdicts_follow_the_numbers():
+    assert [line.split(":")[0] for line in verdicts(made_up())] == ["**Met**"] * 4
+    worse = made_up()
+    for run in worse["runs"]:
+        if run["resolution"] == 1024:
+            run["cpu"] *= 4
+        if run["resolution"] == 512:
+            run["peak_memory_mb"] = 5000.0
+    assert [line.split(":")[0] for line in verdicts(worse)] == ["**Met**", "**Missed**", "**Missed**", "**Missed**"]
+
+
+def test_growth_and_targets_are_read_from_runs_that_are_made():
+    made = {(points, resolution, band, surface) for points, resolution, band, surface in RUNS}
+    needed = {(POINTS, grid, 4, "double") for grid in scale.GRIDS} | {(count, 512, 4, "double") for count in COUNTS}
+    assert needed | {(POINTS, 256, None, "double")} <= made
+
+
+def test_a_folder_without_the_case_is_refused(tmp_path, capsys):
+    pytest.importorskip("open3d")
+    assert scale.main([str(tmp_path)]) == 2
+    assert "holds no .npz case" in capsys.readouterr().err
