@@ -174,7 +174,7 @@ def measure(folder: Path) -> tuple[dict, dict]:
         "rims": _said("rims", rims([opened, band])),
         "agreement": _said("diffusion on the grid", list(agreement())),
         "densities": [_said(f"{row['case']}: {row['points']}", row) for c in (closed, opened) for row in densities(c)],
-        "quality": {sampling: list(_qualities(paths, sampling)) for sampling in SAMPLINGS},
+        "quality": {sampling: found for sampling in SAMPLINGS if (found := list(_qualities(paths, sampling)))},
         "cost": [_said(f"{row['points']} points, {row['resolution']} cells", row) for row in costs(named[0])],
     }
     pictures = {"lines": line_pictures, "offsets": {name: picture for name, (_, picture) in level_sets.items()}}

@@ -20,8 +20,8 @@ UNCOVERED = 1.5  # the surface is never further from its nearest sample than thi
 _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
 _MEMBERSHIP = 8.0  # how fast samples off each other's plane stop counting as one sheet
 _OTHER_SHEETS = 2  # at most, beside that of the nearest sample
-_TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
-_MEMBER = 0.3  # least membership of samples whose patch may cover a query
+TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
+MEMBER = 0.3  # least membership of samples whose patch may cover a query
 _SAG = 0.25  # local spacings, by which a sheet may lie closer than its tangent plane
 
 _TINY = np.finfo(np.float32).tiny
@@ -44,6 +44,22 @@ class Projection:
         return Projection(self.distance[chosen], self.step[chosen], self.past_rim[chosen])
 
 
+@dataclass(frozen=True)
+class SheetFoot:
+    """Where queries fall on one sheet each, continued past its rims.
+
+    tau    : (m,) float64, offset of the query along `axis`     axis    : (m,3) float64, unit normal of the sheet
+    beyond : (m,) float32, how far past the sheet's rim         outward : (m,3) float32, the step past it
+    member : (m,k) float32 in [0,1], how surely each sample near the query belongs to the sheet
+    """
+
+    tau: np.ndarray
+    axis: np.ndarray
+    beyond: np.ndarray
+    outward: np.ndarray
+    member: np.ndarray
+
+
 def project(surface, x: np.ndarray, progress: Progress) -> Projection:
     """Distances and foot points of queries (m,3) on a :class:`LocalSurface`.
 
@@ -60,7 +76,7 @@ def project(surface, x: np.ndarray, progress: Progress) -> Projection:
 
 
 @dataclass(frozen=True)
-class _Nearby:
+class Nearby:
     """The patches of each query's nearest samples, as the query sees them; float32 but for `sample` and `distance`.
 
     sample   : (m,k)                                     distance : (m,k) float64, ascending
@@ -81,15 +97,15 @@ class _Nearby:
     beyond: np.ndarray
     outward: np.ndarray
 
-    def rows(self, chosen) -> "_Nearby":
-        return _Nearby(*(np.take(getattr(self, field.name), chosen, axis=-2) for field in fields(self)))
+    def rows(self, chosen) -> "Nearby":
+        return Nearby(*(np.take(getattr(self, field.name), chosen, axis=-2) for field in fields(self)))
 
 
 def _project(surface, x):
     near = _nearby(surface, x)
     found, step, past_rim, member = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
     apart = np.abs(near.height) - _SAG * surface.columns.spacing[near.sample]
-    rest = (member <= _MEMBER) & (surface.confidence[near.sample] >= _TRUSTED)
+    rest = (member <= MEMBER) & (surface.confidence[near.sample] >= TRUSTED)
     for _ in range(_OTHER_SHEETS):
         rest &= apart < found[:, None]
         row = np.flatnonzero(rest.any(axis=1))
@@ -98,13 +114,28 @@ def _project(surface, x):
         closer = other < found[row]
         chosen = row[closer]
         found[chosen], step[chosen], past_rim[chosen] = other[closer], other_step[closer], other_rim[closer]
-        rest[row] &= member <= _MEMBER
+        rest[row] &= member <= MEMBER
     return found, step, past_rim
+
+
+def membership(between, own, normals) -> np.ndarray:
+    """(m,k) in [0,1]: how surely samples lie on one sheet with another, from their offsets off each other's tangent
+    plane relative to their distance; keeps close sheets apart.
+
+    between : (3,m,k) from the one to the others     own : (3,m) its normal     normals : (3,m,k) theirs
+    """
+    height, height_back = _dot(between, own[:, :, None]), _dot(between, normals)
+    return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(_dot(between, between), _TINY))
 
 
 def _nearby(surface, x):
     k = min(NEAREST, len(surface.points))
     distance, sample = surface.tree.query(x, k=k)
+    return seen_from(surface, x, sample, distance)
+
+
+def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
+    """Samples (m,k) of a :class:`LocalSurface`, nearest first, and their distances, as queries (m,3) see them."""
     columns = surface.columns
     spacing = columns.spacing[sample]
     distance = np.maximum(distance, 1e-9 * spacing)
@@ -116,7 +147,7 @@ def _nearby(surface, x):
     bent = np.stack([_dot(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
     above = (height - 0.5 * _dot(lateral, bent)) / np.sqrt(1 + _dot(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height)
-    return _Nearby(
+    return Nearby(
         sample, distance, offset, normals, height, above, kernel, pull, *excess(surface.rims, sample, lateral, spacing)
     )
 
@@ -125,18 +156,8 @@ def _onto_sheet(surface, near, anchor):
     """Distance, step and whether past a rim, for the sheet of each query's sample number `anchor` (m,); and how
     surely each sample belongs to that sheet, (m,k)."""
     every = np.arange(len(near.sample))
-    member = _membership(near, every, anchor)
-    weight = near.kernel * member
-    weight /= weight.max(axis=1, keepdims=True)
-    axis = fused_axes(weight, near.pull, near.normals)
-    cosine = _dot(near.normals, axis.T.astype(np.float32)[:, :, None])
-    weight *= cosine
-    tau = np.einsum("mk,mk->m", weight, near.above) / np.einsum("mk,mk->m", weight, cosine)
-
-    covers = (np.abs(cosine) > _PARALLEL) & (member > _MEMBER)
-    covers[every, anchor] |= ~covers.any(axis=1)
-    best = np.where(covers, near.beyond, np.inf).argmin(axis=1)
-    step = tau[:, None] * axis + near.outward[:, every, best].T
+    foot = sheet_foot(near, anchor)
+    step = foot.tau[:, None] * foot.axis + foot.outward
     found = np.linalg.norm(step, axis=1)
 
     own, away = near.sample[every, anchor], near.distance[every, anchor]
@@ -146,16 +167,25 @@ def _onto_sheet(surface, near, anchor):
     step[lifted] = near.offset[:, every, anchor].T[lifted]
     found[lifted] = away[lifted]
     step *= (bounded / np.maximum(found, _TINY))[:, None]
-    return bounded, step, near.beyond[every, best] > 0, member
+    return bounded, step, foot.beyond > 0, foot.member
 
 
-def _membership(near, every, anchor):
-    """(m,k) in [0,1]: how surely each sample lies on one sheet with the anchor, from their offsets off each other's
-    tangent plane relative to their distance; keeps close sheets apart."""
+def sheet_foot(near: Nearby, anchor) -> SheetFoot:
+    """Where queries fall on the sheet of their sample number `anchor` (m,)."""
+    every = np.arange(len(near.sample))
     between = near.offset[:, every, anchor][:, :, None] - near.offset
-    height = _dot(between, near.normals[:, every, anchor][:, :, None])
-    height_back = _dot(between, near.normals)
-    return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(_dot(between, between), _TINY))
+    member = membership(between, near.normals[:, every, anchor], near.normals)
+    weight = near.kernel * member
+    weight /= weight.max(axis=1, keepdims=True)
+    axis = fused_axes(weight, near.pull, near.normals)
+    cosine = _dot(near.normals, axis.T.astype(np.float32)[:, :, None])
+    weight *= cosine
+    tau = np.einsum("mk,mk->m", weight, near.above) / np.einsum("mk,mk->m", weight, cosine)
+
+    covers = (np.abs(cosine) > _PARALLEL) & (member > MEMBER)
+    covers[every, anchor] |= ~covers.any(axis=1)
+    best = np.where(covers, near.beyond, np.inf).argmin(axis=1)
+    return SheetFoot(tau, axis, near.beyond[every, best], near.outward[:, every, best].T, member)
 
 
 def _dot(a, b):

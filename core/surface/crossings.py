@@ -7,6 +7,9 @@ the cells around a grid edge vote whether the surface crosses it.
 
 A surface without border crosses an even number of the edges of every grid face. Where votes disagree, around creases
 mostly, edges are turned over until it does (see :mod:`.mending`).
+
+Where sheets meet or run close, their crossings are found sheet by sheet (see :mod:`.meeting_edges`); there an edge may
+be crossed twice.
 """
 
 from dataclasses import dataclass
@@ -17,6 +20,8 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
+from ..progress import Progress
+from .meeting_edges import meeting_edges
 from .mending import mend
 
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
@@ -33,33 +38,69 @@ class Crossings:
 
     node  : (e,) int64, flat index of the edge's lower node     axis : (e,) int64, its direction
     place : (e,3) float64, where, on the surface                cells : (c,) int64, ascending, cells near the surface
+    normal : (e,3) float64, of the sheet, where sheets meet; zero elsewhere
     """
 
     node: np.ndarray
     axis: np.ndarray
     place: np.ndarray
     cells: np.ndarray
+    normal: np.ndarray
 
     def cells_around(self, grid: Grid) -> np.ndarray:
         """The four cells around each edge in cyclic order, by their lowest nodes, (e,4)."""
-        strides = node_strides(grid)
-        first, second = strides[(self.axis + 1) % 3], strides[(self.axis + 2) % 3]
-        return self.node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
+        return _cells_around(self.node, self.axis, node_strides(grid))
+
+    def changing_sides(self) -> np.ndarray:
+        """Edges, as 3 * node + axis, ascending, whose ends are on two sides: crossed an odd number of times."""
+        edge, count = np.unique(3 * self.node + self.axis, return_counts=True)
+        return edge[count % 2 == 1]
 
 
 def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
     """Crossings of the zero set, from the nodes near it."""
+    progress, strides, hair = Progress.of(progress), node_strides(grid), _HAIR * grid.spacing
+    meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.5))
     cells, side = _sides(band, grid)
     edge, vote, place = _vote(cells, side, grid)
-    found = surface.project(place, progress)
+    alone = ~np.isin(edge, meet.zone)
+    edge, vote, place = edge[alone], vote[alone], place[alone]
+    found = surface.project(place, progress.part(0.5, 1.0))
     on = found.distance <= _COVERED * grid.spacing
     edge, place, vote = edge[on], place[on] - found.step[on], vote[on]
+    once, twice = _once(meet)
     node, axis = np.divmod(edge, 3)
-    whole = np.isin(Crossings(node, axis, place, cells).cells_around(grid), cells).all(axis=1)
-    node, axis, place, vote = node[whole], axis[whole], place[whole], vote[whole]
-    crossed = vote > 0
-    mend(node, axis, crossed, np.abs(vote), node_strides(grid))
-    return Crossings(node[crossed], axis[crossed], place[crossed], cells)
+    node, axis = np.concatenate([node, meet.node[once]]), np.concatenate([axis, meet.axis[once]])
+    place = np.concatenate([place, meet.place[once]])
+    normal = np.concatenate([np.zeros((len(edge), 3)), meet.normal[once]])
+    crossed = np.concatenate([vote > 0, meet.crossed[once]])
+    certainty = np.concatenate([np.abs(vote), meet.certainty[once]])
+    whole = np.isin(_cells_around(node, axis, strides), cells).all(axis=1)
+    node, axis, crossed, certainty = node[whole], axis[whole], crossed[whole], certainty[whole]
+    mend(node, axis, crossed, certainty, strides)
+    twice = twice[np.isin(_cells_around(meet.node[twice], meet.axis[twice], strides), cells).all(axis=1)]
+    return Crossings(
+        np.concatenate([node[crossed], meet.node[twice]]),
+        np.concatenate([axis[crossed], meet.axis[twice]]),
+        np.concatenate([place[whole][crossed], meet.place[twice]]),
+        cells,
+        np.concatenate([normal[whole][crossed], meet.normal[twice]]),
+    )
+
+
+def _once(meet):
+    """One candidate for each edge that at most one sheet crosses, that one or the least certain; and all crossings of
+    edges that several cross."""
+    edge, index = np.unique(3 * meet.node + meet.axis, return_inverse=True)
+    several = np.bincount(index, meet.crossed, len(edge))[index] > 1
+    order = np.lexsort([meet.certainty, ~meet.crossed, index])
+    best = order[np.diff(index[order], prepend=-1) > 0]
+    return best[~several[best]], np.flatnonzero(several & meet.crossed)
+
+
+def _cells_around(node, axis, strides):
+    first, second = strides[(axis + 1) % 3], strides[(axis + 2) % 3]
+    return node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
 
 
 def node_strides(grid: Grid) -> np.ndarray:

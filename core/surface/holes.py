@@ -1,11 +1,18 @@
-"""Pinholes of a single layer: border loops around a place where the surface is."""
+"""Pinholes of a single layer: border loops around a place where the surface is.
+
+Where sheets meet, a border may end at a junction, so a hole beside one is bounded by a piece of border and by edges of
+the other sheet.
+"""
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
 
 from ..field.local_surface import LocalSurface
 from .mesh import Mesh
 
 _LONGEST = 32  # edges of a loop that may be closed
+_DETOUR = 1.5  # of the way along the other sheet, relative to the straight one
 _NEAR = 0.5  # cells, the surface is where it is this near
 _UNSEEN = 2.0  # cells, narrower openings are below what the grid shows
 
@@ -14,7 +21,9 @@ def fill_pinholes(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     """Close border loops by a fan of triangles around their middle: those of at most 32 edges that are no wider than
     the bridging length or than two cells, or whose middle and spokes lie on the surface. Wider openings stay."""
     edges, counts = mesh.edge_counts()
-    loops = [loop for loop in _simple_loops(edges[counts == 1]) if len(loop) <= _LONGEST]
+    loops, paths = _simple_loops(edges[counts == 1])
+    loops += _closed(paths, mesh, edges[counts > 1])
+    loops = [loop for loop in loops if len(loop) <= _LONGEST]
     if not loops:
         return mesh
     length = np.array([len(loop) for loop in loops])
@@ -38,20 +47,42 @@ def fill_pinholes(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     )
 
 
-def _simple_loops(edges) -> list[np.ndarray]:
-    """Loops that pass no vertex twice, as vertices in order, out of undirected edges (e,2): loops that touch are parted
-    where they do, and edges that lead nowhere are left out."""
+def _closed(paths, mesh, edges):
+    """Loops of the paths that the shortest way along `edges` (e,2) closes without a detour."""
+    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    length = np.maximum(length, np.finfo(float).tiny)
+    graph = coo_matrix((length, tuple(edges.T)), shape=(len(mesh.vertices),) * 2).tocsr()
+    loops = []
+    for path in paths:
+        if not 3 <= len(path) <= _LONGEST:
+            continue
+        start, end = path[0], path[-1]
+        farthest = _DETOUR * np.linalg.norm(mesh.vertices[start] - mesh.vertices[end])
+        reached, before = dijkstra(graph, directed=False, indices=start, limit=farthest, return_predecessors=True)
+        way = [end]
+        while np.isfinite(reached[end]) and before[way[-1]] != start:
+            way.append(before[way[-1]])
+        if np.isfinite(reached[end]) and not set(way[1:]) & set(path):
+            loops.append(np.array([*path, *way[1:]]))
+    return loops
+
+
+def _simple_loops(edges) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Loops that pass no vertex twice, and the paths that are left, as vertices in order, out of undirected edges
+    (e,2): loops that touch are parted where they do."""
     left = {}
     for a, b in edges.tolist():
         left.setdefault(a, set()).add(b)
         left.setdefault(b, set()).add(a)
-    loops = []
+    loops, dead = [], []
     for start in sorted(left):
         path, place = [start], {start: 0}
         while path:
             ways = left[path[-1]]
             if not ways:
-                del place[path.pop()]
+                del place[path[-1]]
+                dead.append(path[-2:])
+                path.pop()
                 continue
             ahead = min(ways)
             ways.remove(ahead)
@@ -65,4 +96,23 @@ def _simple_loops(edges) -> list[np.ndarray]:
             for vertex in path[back + 1 :]:
                 del place[vertex]
             del path[back + 1 :]
-    return loops
+    return loops, _paths([edge for edge in dead if len(edge) == 2])
+
+
+def _paths(edges):
+    """Paths that run through all edges of a forest, each as far as it goes, as vertices in order."""
+    left = {}
+    for a, b in edges:
+        left.setdefault(a, set()).add(b)
+        left.setdefault(b, set()).add(a)
+    paths = []
+    for start in sorted(left):
+        while len(left[start]) % 2:
+            path = [start]
+            while left[path[-1]]:
+                ahead = min(left[path[-1]])
+                left[path[-1]].remove(ahead)
+                left[ahead].remove(path[-1])
+                path.append(ahead)
+            paths.append(np.array(path))
+    return paths

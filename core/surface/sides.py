@@ -121,7 +121,7 @@ def _edges_of(node, near, crossings, grid):
         keys += [3 * node + axis, 3 * below[~at_nodes(near, below)] + axis]
     keys = np.concatenate(keys)
     node, axis = np.divmod(keys, 3)
-    return node, node + node_strides(grid)[axis], np.isin(keys, 3 * crossings.node + crossings.axis)
+    return node, node + node_strides(grid)[axis], np.isin(keys, crossings.changing_sides())
 
 
 def _sides(a, b, crossed, n, outside):

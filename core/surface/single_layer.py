@@ -10,11 +10,13 @@ from .holes import fill_pinholes
 from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
+from .sharing import shared_vertices
 from .sides import Sides
 from .signed import signed_mesh
 from .triangles import triangles
 
 _ROUNDS = 2
+_STIFFNESS = 0.05  # of vertices against moving along what their planes leave open
 
 
 def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None):
@@ -31,17 +33,44 @@ def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurfa
 def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
     """Dual contouring of the zero set (Ju et al., ACM TOG 21(3), 2002), by the edges its two sides are told apart on.
 
-    Every cell that the surface passes has one vertex, the mean of its crossings taken to its foot point; every crossed
-    grid edge one quad, split in two; what pinholes are left are closed. Two sheets within one cell share its vertex.
+    Every cell that the surface passes has one vertex, the mean of its crossings taken to its foot point, but one for
+    each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two. Where sheets
+    meet, vertices are put where the planes of their crossings meet. What pinholes are left are closed.
     """
     progress = Progress.of(progress)
-    cell, quads = np.unique(crossings.cells_around(grid), return_inverse=True)
-    quads = quads.reshape(-1, 4)
-    weight = np.bincount(quads.reshape(-1), minlength=len(cell))
-    place = np.repeat(crossings.place, 4, axis=0)
-    vertices = np.stack([np.bincount(quads.reshape(-1), place[:, a], len(cell)) for a in range(3)], axis=1)
-    vertices /= weight[:, None]
+    quads, count, kind = shared_vertices(crossings, grid)
+    corner, place = quads.reshape(-1), np.repeat(crossings.place, 4, axis=0)
+    weight = np.bincount(corner, minlength=count)
+    vertices = np.stack([np.bincount(corner, place[:, a], count) for a in range(3)], axis=1) / weight[:, None]
+    meeting = kind > 0
+    vertices[meeting] += _to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), grid)[meeting]
+    free = kind < 2
     for turn in range(_ROUNDS):
-        vertices = vertices - surface.project(vertices, progress.part(0.5 * turn, 0.5 + 0.5 * turn)).step
-    mesh = pieces_with_samples(Mesh(vertices, triangles(vertices, quads)), surface.tree, grid.spacing)
+        part = progress.part(0.5 * turn, 0.5 + 0.5 * turn)
+        vertices[free] -= surface.project(vertices[free], part).step
+    mesh = _without_repeats(Mesh(vertices, triangles(vertices, quads)))
+    mesh = pieces_with_samples(mesh, surface.tree, grid.spacing)
     return fill_pinholes(mesh, surface, grid.spacing)
+
+
+def _to_planes(vertices, corner, place, normal, grid):
+    """Steps (v,3) to where the planes of each vertex's crossings meet, in least squares, a cell long at most."""
+    offset = np.einsum("ci,ci->c", normal, place - vertices[corner])
+    matrix = np.zeros((len(vertices), 3, 3))
+    right = np.zeros((len(vertices), 3))
+    for a in range(3):
+        right[:, a] = np.bincount(corner, normal[:, a] * offset, len(vertices))
+        for b in range(3):
+            matrix[:, a, b] = np.bincount(corner, normal[:, a] * normal[:, b], len(vertices))
+    weight = np.bincount(corner, minlength=len(vertices))
+    step = np.linalg.solve(matrix + _STIFFNESS * weight[:, None, None] * np.eye(3), right[..., None])[..., 0]
+    length = np.linalg.norm(step, axis=1, keepdims=True)
+    return step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
+
+
+def _without_repeats(mesh):
+    """The mesh without faces that pass a vertex twice or that it has already."""
+    ordered = np.sort(mesh.faces, axis=1)
+    proper = np.flatnonzero((np.diff(ordered, axis=1) > 0).all(axis=1))
+    _, first = np.unique(ordered[proper], axis=0, return_index=True)
+    return Mesh(mesh.vertices, mesh.faces[proper[np.sort(first)]])

@@ -77,7 +77,7 @@ def test_cells_around_an_edge_share_it():
     strides = node_strides(GRID)
     assert strides.tolist() == [27 * 28, 28, 1]
     node = np.full(3, strides @ [5, 6, 7])
-    cells = Crossings(node, np.arange(3), np.zeros((3, 3)), np.empty(0, int)).cells_around(GRID)
+    cells = Crossings(node, np.arange(3), np.zeros((3, 3)), np.empty(0, int), np.zeros((3, 3))).cells_around(GRID)
     for axis, around in enumerate(cells):
         corners = np.stack(np.unravel_index(around, GRID.shape), axis=1) - [5, 6, 7]
         assert set(corners[:, axis]) == {0}
@@ -115,3 +115,9 @@ def test_a_sheet_through_grid_nodes_is_one_plane_of_edges():
 def test_stops_when_told(sphere):
     with pytest.raises(Cancelled):
         find_crossings(*sphere, GRID, lambda *_: False)
+
+
+def test_an_edge_crossed_twice_changes_no_side():
+    node, axis = np.array([500, 500, 500, 501]), np.array([0, 0, 1, 0])
+    crossings = Crossings(node, axis, np.zeros((4, 3)), np.empty(0, int), np.zeros((4, 3)))
+    assert crossings.changing_sides().tolist() == [1501, 1503]

@@ -85,6 +85,29 @@ def test_what_is_closed_stays_as_it_is(plane):
     assert fill_pinholes(mesh, plane, CELL) is mesh
 
 
+def wall(n=12):
+    """A floor of n x n cells and a wall on the middle line of it, without two of the quads that stand on the floor."""
+    floor = lattice(set(), n=n)
+    middle = np.arange(n + 1) + n // 2 * (n + 1)
+    rows = np.concatenate([middle[None], len(floor.vertices) + np.arange(4 * (n + 1)).reshape(4, -1)])
+    up = floor.vertices[middle] + CELL * np.arange(1, 5)[:, None, None] * np.array([0, 0, 1])
+    i, j = np.array([(i, j) for i in range(4) for j in range(n) if (i, j) not in {(0, 5), (0, 6)}]).T
+    a, b, c, d = rows[i, j], rows[i, j + 1], rows[i + 1, j + 1], rows[i + 1, j]
+    faces = np.concatenate([floor.faces, np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh(np.concatenate([floor.vertices, up.reshape(-1, 3)]), faces.astype(np.int32))
+
+
+def test_a_hole_beside_a_junction_closes_along_the_other_sheet(plane):
+    """Its border alone is no loop: it ends at the junction, and edges of the floor bound the rest."""
+    mesh = wall()
+    border = mesh.edge_counts()[0][mesh.edge_counts()[1] == 1]
+    closed = fill_pinholes(mesh, plane, CELL)
+    _, counts = closed.edge_counts()
+    assert (counts == 1).sum() == len(border) - 4
+    assert (counts == 3).sum() == 12  # all along the wall's foot
+    assert closed.face_areas().sum() == pytest.approx(mesh.face_areas().sum() + 2 * CELL**2)
+
+
 def test_edges_that_form_no_loop_are_left_alone(plane):
     """Three triangles on one edge: border paths that end at it still close around it, but nothing is doubled."""
     vertices = np.array([[0, 0, 0], [0, 0.5, 0], [0.5, 0, 0], [-0.5, 0, 0], [0, 0, 0.5]])

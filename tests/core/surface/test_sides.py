@@ -28,11 +28,12 @@ def crossings_of(inside):
         node.append(np.delete(flat, -1, axis=a)[change])
         axis.append(np.full(change.sum(), a))
     node, axis = np.concatenate(node), np.concatenate(axis)
-    return Crossings(node, axis, GRID.positions(node), np.empty(0, int))
+    return Crossings(node, axis, GRID.positions(node), np.empty(0, int), np.zeros((len(node), 3)))
 
 
 def without(crossings, dropped):
-    return Crossings(crossings.node[~dropped], crossings.axis[~dropped], crossings.place[~dropped], crossings.cells)
+    kept = (array[~dropped] for array in (crossings.node, crossings.axis, crossings.place))
+    return Crossings(*kept, crossings.cells, crossings.normal[~dropped])
 
 
 @pytest.mark.parametrize(
@@ -89,6 +90,7 @@ def test_an_inner_wall_has_the_inside_on_both_faces(surface):
         np.concatenate([crossings.axis, np.full(len(wall), 2)]),
         np.concatenate([crossings.place, GRID.positions(wall)]),
         crossings.cells,
+        np.zeros((len(crossings.node) + len(wall), 3)),
     )
     z = GRID.origin[2] + GRID.spacing * np.arange(29)
     distance = np.minimum(np.abs(RADIUS - 1), np.hypot(z - 0.04, np.maximum(RADIUS - 1, 0)))

@@ -133,6 +133,21 @@ def test_sheets_of_a_junction_are_joined_along_their_line_only():
     assert KDTree(wall).query(seam)[0].max() < 2 * run.field.spacing
 
 
+@pytest.mark.parametrize(("name", "most"), [("junction", 1), ("crossing", 2)])
+def test_sheets_meet_along_one_line_without_slits(name, most):
+    """Askew to the grid. One border loop would be right for both; two sheets that end at each other's rims may miss."""
+    turn = shapes.random_rotation(1)
+    flat = shapes.square(1000)
+    crossing = np.concatenate([flat, flat[:, [2, 1, 0]] + np.array([0, 1e-3, 1e-3])])
+    run = single({"junction": shapes.junction(2000), "crossing": crossing}[name] @ turn.T)
+    edges, counts = run.sheet.edge_counts()
+    middle = run.sheet.vertices[edges[counts > 2]].mean(axis=1) @ turn
+    assert np.hypot(middle[:, 0], middle[:, 2]).max() < run.field.spacing
+    assert np.ptp(middle[:, 1]) > 1.9
+    assert run.sheet.border_loops() <= most
+    assert len(shapes.components(run.sheet)) == 1
+
+
 @pytest.mark.parametrize(("bridge", "loops"), [(3.0, 2), (8.0, 1)])
 def test_a_hole_narrower_than_bridge_closes_and_a_wider_one_stays_open(bridge, loops):
     points = shapes.holed_square(1000, radius=0.16)

@@ -1,0 +1,81 @@
+"""Where several sheets meet, cross, or run close to each other.
+
+A crease or a tight bend looks like two sheets to a few samples, too. Two samples lie on different sheets where neither
+is on the other's tangent plane, where no chain of samples leads from one to the other along the surface, and where
+their sheets either run side by side or one goes on past the other's plane; where most pairs of a neighbourhood do.
+"""
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..field.local_surface import LocalSurface
+from ..field.projection import MEMBER, TRUSTED, membership
+from ..progress import Progress
+
+NEIGHBOURS = 32
+_CHAIN = 2  # links
+_LINKED = 0.8  # least confidence of samples in a chain
+_SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
+_WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least membership of them
+_PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
+_CHUNK = 32768  # samples
+_SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
+
+
+def meetings(surface: LocalSurface, progress=None) -> np.ndarray:
+    """(n,) bool: samples in whose neighbourhood there are several sheets."""
+    progress, n = Progress.of(progress), len(surface.points)
+    nearest, member = _members(surface, np.arange(n), NEIGHBOURS + 1, progress)
+    alike = member > MEMBER
+    i, at = np.nonzero(~alike & (surface.confidence[nearest] >= TRUSTED) & (surface.confidence >= TRUSTED)[:, None])
+    j = nearest[i, at]
+    if not len(i):
+        return np.zeros(n, bool)
+    apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
+    cosine = np.abs(np.einsum("mi,mi->m", surface.normals[i], surface.normals[j]))
+    apart &= (cosine > _SIDE_BY_SIDE) | _goes_past(i, j, surface)
+    around = csr_matrix((np.ones(nearest.size), (np.repeat(np.arange(n), nearest.shape[1]), nearest.reshape(-1))))
+    pairs, found = around @ np.bincount(i, minlength=n), around @ np.bincount(i, apart, n)
+    return (found >= _LEAST) & (found >= _SHARE * pairs)
+
+
+def _linked(i, j, nearest, alike, sure):
+    """Whether samples i and j, (m,) each, have a chain of alike neighbours between them."""
+    n = len(nearest)
+    row, at = np.nonzero(alike & sure[:, None] & sure[nearest])
+    links = csr_matrix((np.ones(len(row), np.int32), (row, nearest[row, at])), shape=(n, n))
+    links = links + links.T
+    start, row = np.unique(i, return_inverse=True)
+    reached = links[start]
+    for _ in range(_CHAIN - 1):
+        reached = reached @ links
+    return np.asarray(reached[row, j]).reshape(-1) > 0
+
+
+def _goes_past(i, j, surface):
+    """Whether the sheet of either sample has samples well on both sides of the other's tangent plane."""
+    every = np.unique(np.concatenate([i, j]))
+    wide, member = _members(surface, every, _WIDER, Progress())
+    member = member > _STRAIGHT
+    member &= surface.confidence[wide] >= _LINKED
+    past = np.zeros(len(i), bool)
+    for one, other in ((i, j), (j, i)):
+        row = np.searchsorted(every, one)
+        away = surface.points[wide[row]] - surface.points[other][:, None]
+        height = np.einsum("mki,mi->mk", away, surface.normals[other])
+        limit = _PAST * surface.spacing[one]
+        above = np.where(member[row], height, -np.inf).max(axis=1) > limit
+        past |= above & (np.where(member[row], height, np.inf).min(axis=1) < -limit)
+    return past
+
+
+def _members(surface, own, k, progress):
+    """The k samples nearest to the samples `own` (m,), and how surely each lies on one sheet with them, (m,k)."""
+    k = min(k, len(surface.points))
+    nearest, member = np.empty((len(own), k), np.int64), np.empty((len(own), k), np.float32)
+    for part in progress.chunks(len(own), _CHUNK):
+        nearest[part] = surface.tree.query(surface.points[own[part]], k=k, workers=-1)[1]
+        between = np.moveaxis(surface.points[nearest[part]] - surface.points[own[part]][:, None], 2, 0)
+        normals = np.moveaxis(surface.normals[nearest[part]], 2, 0)
+        member[part] = membership(between, surface.normals[own[part]].T, normals)
+    return nearest, member

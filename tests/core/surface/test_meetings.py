@@ -1,0 +1,86 @@
+"""Which samples have several sheets near them, and what is known of the sheets there."""
+
+import numpy as np
+import pytest
+
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.meetings import meetings
+from core.surface.sheets import sheets_near
+from tests import shapes
+
+
+def fitted(points, normals):
+    return fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
+
+
+def crossed():
+    """Two squares that cross along the y axis, z = 0 and x = 0."""
+    flat = shapes.square(1200)
+    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
+    return fitted(np.concatenate([flat, flat[:, [2, 1, 0]] + np.array([0, 0, 1e-3])]), normals)
+
+
+def cube():
+    """With the normals of its faces."""
+    points = shapes.cube(2400)
+    normals = np.zeros_like(points)
+    normals[np.arange(len(points)), np.abs(points).argmax(axis=1)] = 1
+    return fitted(points, normals)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "cube"])
+def test_one_sheet_meets_none(name):
+    """Not even at the edges of a cube, where two faces end."""
+    if name == "cube":
+        surface = cube()
+    elif name == "sphere":
+        surface = fitted(shapes.sphere(1000), shapes.sphere(1000))
+    else:
+        points = shapes.torus(2000)
+        ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
+        surface = fitted(points, (points - ring) / 0.4)
+    assert not meetings(surface).any()
+
+
+def test_crossing_squares_meet_along_their_line_only():
+    surface = crossed()
+    away = np.hypot(surface.points[:, 0], surface.points[:, 2]) / np.median(surface.spacing)
+    found = meetings(surface)
+    inside = np.abs(surface.points[:, 1]) < 0.8
+    assert found[(away < 1) & inside].all()
+    assert not found[away > 9].any()
+
+
+def test_sheets_side_by_side_meet():
+    """At .7 spacings, seen by samples beyond the nearest few."""
+    points = shapes.sheets(2400, gap=0.04)
+    surface = fitted(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    assert 0.8 * np.median(surface.spacing) > 0.04
+    inner = (np.abs(points[:, :2]) < 0.8).all(axis=1)
+    assert meetings(surface)[inner].mean() > 0.95
+
+
+def test_a_node_near_a_crossing_knows_both_sheets():
+    surface, cell = crossed(), 0.05
+    rng = np.random.default_rng(0)
+    x = rng.uniform([-0.07, -0.5, -0.07], [0.07, 0.5, 0.07], (200, 3))
+    nobody = [np.full(len(x), -1)] * 6
+    found = sheets_near(surface, x, nobody, cell)
+    assert (np.bincount(found.node, minlength=200) == 2).all()
+    level = np.abs(found.axis[:, 2]) > 0.7
+    np.testing.assert_allclose(np.abs(found.axis[level]) @ [0, 0, 1], 1, atol=1e-6)
+    np.testing.assert_allclose(np.abs(found.tau[level]), np.abs(x[found.node[level], 2]), atol=2e-3)
+    np.testing.assert_allclose(np.abs(found.tau[~level]), np.abs(x[found.node[~level], 0]), atol=2e-3)
+
+
+def test_a_sheet_is_told_to_the_neighbour_that_does_not_know_it():
+    surface, cell = crossed(), 0.05
+    unsure = (np.abs(surface.points[:, 0]) < 1e-9) & (surface.points[:, 1] > 0)
+    surface.confidence[unsure] = 0.5
+    x = np.array([[0.03, -0.3, 0.02], [0.03, 0.3, 0.02]])
+    nobody = np.full(2, -1)
+    assert np.bincount(sheets_near(surface, x, [nobody] * 6, cell).node).tolist() == [2, 1]
+    told = sheets_near(surface, x, [np.array([1, -1])] + [nobody] * 5, cell)
+    assert np.bincount(told.node).tolist() == [2, 2]
+    assert np.sort(np.abs(told.tau[told.node == 1])) == pytest.approx([0.02, 0.03], abs=2e-3)
