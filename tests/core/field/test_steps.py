@@ -74,7 +74,8 @@ def test_no_sheet_appears_midway_between_two(gap):
 
 def test_positions_away_from_the_band_are_left_out():
     row, _ = band(onto_plane((0, 0, 1), 5.0)).distances(positions(), SHAPE, 1.0)
-    assert len(row) and (np.abs(positions()[row, 2] - 5.0) < 3).all()
+    assert len(row)
+    assert (np.abs(positions()[row, 2] - 5.0) < 3).all()
     assert not len(NearBand(np.empty(0, np.int64), np.empty((0, 3))).distances(positions(), SHAPE, 1.0)[0])
 
 
