@@ -11,7 +11,6 @@ from .geometry import closest_faces, face_normals, surface_samples
 
 SAMPLES = 200_000
 NEAR_CURVE = 0.05
-_ZERO_AREA = 1e-6  # of the mean face area
 
 
 def surface_errors(mesh: Mesh, truth: Mesh, seed: int = 0, count: int = SAMPLES) -> dict:
@@ -75,16 +74,6 @@ def cover_euler(truth: Mesh, nm_curve: np.ndarray) -> int | None:
     found = topology(truth)
     crosses_unmarked = len(nm_curve) > 0 and not found["nonmanifold_edges"]
     return None if crosses_unmarked else 2 * found["euler"]
-
-
-def triangle_quality(mesh: Mesh) -> dict:
-    """Mean of the triangles' smallest angles, degrees, and the share of triangles without area."""
-    corners = mesh.vertices[mesh.faces]
-    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    sine = np.linalg.norm(np.cross(ahead, behind), axis=2)
-    angles = np.degrees(np.arctan2(sine, np.einsum("fki,fki->fk", ahead, behind)))
-    areas = mesh.face_areas()
-    return {"min_angle": angles.min(axis=1).mean(), "zero_area": (areas <= _ZERO_AREA * areas.mean()).mean()}
 
 
 def normal_agreement(axes: np.ndarray, true_normals: np.ndarray, points: np.ndarray, nm_curve: np.ndarray) -> dict:

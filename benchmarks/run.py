@@ -6,13 +6,14 @@ from pathlib import Path
 
 from core import Settings, reconstruct
 from core.memory import peak_memory_mb
+from core.surface.quality import triangle_quality
 
 from . import peers
 from .against import best_peer
 from .cases import load_case
 from .field_metrics import field_errors, past_rims
 from .measure_peers import measure_peers
-from .metrics import cover_euler, normal_agreement, surface_errors, topology, triangle_quality
+from .metrics import cover_euler, normal_agreement, surface_errors, topology
 from .processes import Failed, run_fresh, run_warm
 
 PEER_LIMIT = 600.0  # seconds, all variants together

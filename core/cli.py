@@ -18,13 +18,14 @@ from .field.grid import fit_grid
 from .io.atomic import writable_folder
 from .io.npz import write_arrays
 from .io.ply import write_mesh, write_points
-from .io.points import READERS, read_points
+from .io.points import READERS, read_points, read_scan
 from .io.report import report_json, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
 from .points import local_spacing, prepare_samples
 from .reconstruction import Reconstruction
 from .settings import Settings, default_in_words, options
+from .surface.attributes import sample_attributes, vertex_attributes
 
 PROGRAM = "python -m core"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
@@ -56,7 +57,9 @@ files in the folder OUT, named after the scan, each written whole or not at all:
                    field), gradient (at every node); for the nodes near the surface node (i,j,k), direction (unit, away
                    from the surface) and foot (the nearest point of the surface)
   SCAN.json        settings, counts, seconds, warnings; written last
-All are in the scan's own units and place.
+All are in the scan's own units and place. Vertices of meshes have the properties distance (how far off the surface)
+and confidence (of the nearest sample); where SCAN is a .ply, meshes and points also carry what its points do: colours
+(red, green, blue), intensity and every other property that is one number.
 """
 
 
@@ -155,11 +158,11 @@ def _number(text):
 
 def _reconstruct(given):
     settings = Settings(**{name: getattr(given, name) for name in options()})
-    points = read_points(given.scan)
+    points, carried = read_scan(given.scan)
     folder = writable_folder(given.output)
     with _progress() as progress:
         result = reconstruct(points, settings, progress=progress)
-    report = _write(result, folder, given.scan, given.gradient, given.arrays)
+    report = _write(result, carried, folder, given.scan, given.gradient, given.arrays)
     for warning in report["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
     print(report_json(report) if given.json else _summary(report))
@@ -191,9 +194,9 @@ def _progress():
         signal.signal(signal.SIGINT, previous)
 
 
-def _write(result: Reconstruction, folder, scan, gradient, arrays):
+def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
     """Write every file; the report, which lists them, goes last. Returns the report."""
-    samples = dict(points=result.points, normals=result.normals, confidence=result.confidence)
+    samples = dict(points=result.points, normals=result.normals, attributes=sample_attributes(result, carried))
     writers = {
         "_points.ply": partial(write_points, **samples),
         ".vdb": partial(write_vdb, field=result.field, gradient=gradient),
@@ -201,7 +204,7 @@ def _write(result: Reconstruction, folder, scan, gradient, arrays):
     closed = "_signed.ply" if result.field.sdf else "_double.ply"
     for ending, mesh in ((closed, result.surface), ("_single.ply", result.sheet)):
         if mesh is not None:
-            writers[ending] = partial(write_mesh, mesh=mesh)
+            writers[ending] = partial(write_mesh, mesh=mesh, attributes=vertex_attributes(mesh, result, carried))
     if arrays:
         writers[".npz"] = partial(write_arrays, result=result)
 

@@ -21,6 +21,7 @@ from .progress import Progress
 from .reconstruction import Reconstruction
 from .settings import Settings
 from .surface.extract import band_for, extract_surfaces
+from .surface.quality import triangle_quality
 
 
 def reconstruct(
@@ -97,7 +98,12 @@ def reconstruct(
         "cleaning": cleaning,
         "normals": solved,
         "meshes": {
-            kind: {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": mesh.border_loops()}
+            kind: {
+                "vertices": len(mesh.vertices),
+                "faces": len(mesh.faces),
+                "borders": mesh.border_loops(),
+                **triangle_quality(mesh),
+            }
             for kind, mesh in surfaces.meshes.items()
         },
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},

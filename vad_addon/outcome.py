@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..core import pipeline
 from ..core.cleaning.clean import clean
@@ -17,6 +16,7 @@ from ..core.normals.estimate import checked_constraints, estimate_normals
 from ..core.points import local_spacing, prepare_samples
 from ..core.progress import Progress
 from ..core.settings import Settings
+from ..core.surface.attributes import nearest_samples, residuals
 
 CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
 
@@ -65,7 +65,7 @@ class Skin:
     """A triangle mesh and what its vertices know.
 
     vertices : (v,3) float64 in input units     faces    : (f,3) int32
-    nearest  : (v,) int64, the nearest sample   distance : (v,) float64, the field there, in input units
+    nearest  : (v,) int64, the nearest sample   distance : (v,) float64, how far off, in input units
     """
 
     vertices: np.ndarray
@@ -210,8 +210,7 @@ def _reconstructed(task, folder, progress):
 
 
 def _skin(mesh, result):
-    _, nearest = KDTree(result.points).query(mesh.vertices, workers=-1)
-    return Skin(mesh.vertices, mesh.faces, nearest, result.field.sample(mesh.vertices))
+    return Skin(mesh.vertices, mesh.faces, nearest_samples(mesh, result), residuals(mesh, result))
 
 
 def centre(points: np.ndarray) -> np.ndarray:

@@ -18,6 +18,8 @@ from .steps import NearBand
 
 _HALF = 0.5 * np.sqrt(3)  # cells, from the middle of a group of 2^3 nodes to each of them
 _MARGIN = 1.0  # cells, by which a projection may err in leaving a group out
+_ERROR = 0.05  # the same around sparse samples, relative to how far their patches reach
+_SPARSE = 4.0  # sides of a group; patches that reach further are sparse
 _PIECE = 1 << 17  # nodes or groups at a time
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
@@ -46,17 +48,23 @@ def trimmed(values: Blocks, band: float) -> Blocks:
 
 def _groups(surface, grid, width, progress):
     """Groups of 2^3 nodes that may lie within the width: indices (i,j,k) of their lowest nodes, (g,3) int32, and the
-    sample nearest to their middle, (g,) int32."""
+    sample nearest to their middle, (g,) int32. Around sparse samples, which would claim all nodes as far as their
+    patches reach, larger groups are projected onto the surface first."""
     block, reach = _blocks(surface, grid, width)
     corner = SIDE * np.stack(np.unravel_index(block, table_shape(grid.shape)), axis=1).astype(np.int32)
     found = []
     for rows in progress.chunks(len(block), _PIECE // 64):
         part, far = corner[rows], reach[rows]
-        for side in (4, 2):
-            part = (part[:, None] + side * _CORNERS.astype(np.int32)).reshape(-1, 3)
-            far = np.repeat(far, 8)
-            distance, sample = surface.tree.query(_middles(grid, part, side), workers=-1)
+        for side in (SIDE, 4, 2):
+            if side < SIDE:
+                part = (part[:, None] + side * _CORNERS.astype(np.int32)).reshape(-1, 3)
+                far = np.repeat(far, 8)
+            middle = _middles(grid, part, side)
+            distance, sample = surface.tree.query(middle, workers=-1)
             kept = distance <= grid.spacing * (width + far + _HALF * (side - 1))
+            wide = np.flatnonzero(kept & (far > _SPARSE * side)) if side > 2 else []
+            room = width + _HALF * (side - 1) + _MARGIN + _ERROR * far[wide]
+            kept[wide] = surface.project(middle[wide]).distance <= grid.spacing * room
             part, far, sample = part[kept], far[kept], sample[kept]
         inside = (part < grid.shape).all(axis=1)
         found.append((part[inside], sample[inside].astype(np.int32)))

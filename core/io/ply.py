@@ -13,30 +13,37 @@ from ..surface.mesh import Mesh
 from .atomic import atomic_path
 
 
-def write_mesh(path: str | os.PathLike, mesh: Mesh) -> None:
-    """Write `mesh` as `path`: vertices double x, y, z in input units; faces as lists of three int32 indices."""
+def write_mesh(path: str | os.PathLike, mesh: Mesh, attributes: dict[str, np.ndarray] | None = None) -> None:
+    """Write `mesh` as `path`: vertices double x, y, z in input units; faces as lists of three int32 indices.
+
+    attributes : further properties of the vertices by name, (v,) each, written in their own type
+    """
     faces = np.empty(len(mesh.faces), [("vertex_indices", "<i4", (3,))])
     faces["vertex_indices"] = mesh.faces
-    _write(path, PlyElement.describe(_records(x_y_z=mesh.vertices), "vertex"), PlyElement.describe(faces, "face"))
+    vertices = _records(_triple("xyz", mesh.vertices) | (attributes or {}))
+    _write(path, PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face"))
 
 
 def write_points(
-    path: str | os.PathLike, points: np.ndarray, normals: np.ndarray, confidence: np.ndarray | None = None
+    path: str | os.PathLike, points: np.ndarray, normals: np.ndarray, attributes: dict[str, np.ndarray] | None = None
 ) -> None:
-    """Write `points` (n,3) with their `normals` (n,3) and, where given, `confidence` (n,) as `path`.
+    """Write `points` (n,3) with their `normals` (n,3) as `path`.
 
-    Properties: double x, y, z in input units; float nx, ny, nz (unit axes); float confidence in [0,1].
+    Properties: double x, y, z in input units; float nx, ny, nz (unit axes); and `attributes` as in :func:`write_mesh`.
     """
-    columns = dict(x_y_z=points, nx_ny_nz=np.asarray(normals, np.float32))
-    if confidence is not None:
-        columns["confidence"] = np.asarray(confidence, np.float32)[:, None]
-    _write(path, PlyElement.describe(_records(**columns), "vertex"))
+    axes = _triple(("nx", "ny", "nz"), np.asarray(normals, np.float32))
+    records = _records(_triple("xyz", points) | axes | (attributes or {}))
+    _write(path, PlyElement.describe(records, "vertex"))
 
 
-def _records(**columns):
-    """Structured array out of (n,k) blocks, each under its k names joined by underscores."""
-    fields = {name: block[:, k] for names, block in columns.items() for k, name in enumerate(names.split("_"))}
-    records = np.empty(len(next(iter(fields.values()))), [(name, f"<f{x.itemsize}") for name, x in fields.items()])
+def _triple(names, block):
+    return dict(zip(names, block.T, strict=True))
+
+
+def _records(fields):
+    """Structured little-endian array out of columns (n,) by name."""
+    types = [(name, column.dtype.newbyteorder("<")) for name, column in fields.items()]
+    records = np.empty(len(next(iter(fields.values()))), types)
     for name, column in fields.items():
         records[name] = column
     return records

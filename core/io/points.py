@@ -19,16 +19,22 @@ def _read_ply(path):
     return read_ply(path)
 
 
+def _bare(read):
+    """A reader of points as one of points and attributes, of which it finds none."""
+    return lambda path: (read(path), {})
+
+
 READERS = {
     ".ply": _read_ply,
-    ".xyz": read_text,
-    ".pts": read_text,
-    ".txt": read_text,
-    ".csv": read_text,
-    ".npy": read_npy,
-    ".npz": read_npz,
-    ".obj": read_obj,
+    ".xyz": _bare(read_text),
+    ".pts": _bare(read_text),
+    ".txt": _bare(read_text),
+    ".csv": _bare(read_text),
+    ".npy": _bare(read_npy),
+    ".npz": _bare(read_npz),
+    ".obj": _bare(read_obj),
 }
+_NORMALS = "nx", "ny", "nz"
 
 
 def read_points(path: str | os.PathLike) -> np.ndarray:
@@ -44,15 +50,25 @@ def read_points(path: str | os.PathLike) -> np.ndarray:
     :class:`InputError` for anything else, before memory is taken for what the file does not hold, and
     :class:`MissingDependency` for .ply without plyfile.
     """
+    return read_scan(path)[0]
+
+
+def read_scan(path: str | os.PathLike) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """The points, as :func:`read_points` reads them, and their attributes by name, (n,) each, as stored.
+
+    Attributes are read from .ply alone: every property of the vertices that is one number (red, green, blue, intensity,
+    ...), but normals, which belong to the surface the points came from.
+    """
     path = Path(path)
     try:
         read = _reader(path)
-        points = read(path)
+        points, attributes = read(path)
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror or error}); check path and permissions") from error
     if not len(points):
         raise InputError(f"{path} holds no points")
-    return np.ascontiguousarray(points, np.float64)
+    carried = {name: values for name, values in attributes.items() if name not in _NORMALS}
+    return np.ascontiguousarray(points, np.float64), carried
 
 
 def _reader(path):

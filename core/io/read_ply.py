@@ -13,8 +13,8 @@ _FIRST_LINE = re.compile(rb"ply(\r\n|\n|\r)")
 _ELEMENT = re.compile(rb"^([ \t]*element[ \t]+\S+)[ \t]+(-?\d+)[ \t]*$", re.MULTILINE)
 
 
-def read_ply(path: Path) -> np.ndarray:
-    """x, y, z of the vertices, (n,3) float64."""
+def read_ply(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """x, y, z of the vertices, (n,3) float64, and what else they have one number of, by name, (n,) as stored."""
     try:
         return _read(path.read_bytes())
     except (PlyParseError, ValueError, OverflowError) as error:
@@ -49,7 +49,8 @@ def _read(content):
         vertices, rest = _read_rows(through_vertex, counts, layout, content[start:])
     if last == len(names) - 1 and rest.strip():
         raise ValueError(f"its header claims {counts[last]} vertices, but more data follows them")
-    return np.stack([vertices[axis].astype(np.float64) for axis in "xyz"], axis=1)
+    points = np.stack([vertices[axis].astype(np.float64) for axis in "xyz"], axis=1)
+    return points, {p.name: vertices[p.name] for p in vertex.properties if p.name in scalars - set("xyz")}
 
 
 def _header(content):

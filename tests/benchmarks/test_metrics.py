@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.metrics import cover_euler, normal_agreement, surface_errors, topology, triangle_quality
+from benchmarks.metrics import cover_euler, normal_agreement, surface_errors, topology
 from core import Mesh
 
 TETRAHEDRON = Mesh(
@@ -65,12 +65,6 @@ def test_the_cover_of_a_sheet_is_a_sphere_and_of_a_sphere_two():
     assert cover_euler(TETRAHEDRON, none) == 4
     assert cover_euler(THREE_SHEETS, crossing) == 2
     assert cover_euler(square(), crossing) is None
-
-
-def test_triangle_quality():
-    assert triangle_quality(TETRAHEDRON) == pytest.approx({"min_angle": 60, "zero_area": 0})
-    sliver = Mesh(np.vstack([square().vertices, [[0.5, 0, 0]]]), np.array([[0, 1, 2], [0, 1, 4]], np.int32))
-    assert triangle_quality(sliver) == pytest.approx({"min_angle": 22.5, "zero_area": 0.5})
 
 
 def test_normal_agreement_ignores_signs_and_looks_near_the_curve():

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from core import Cancelled, DistanceField, InputError, Mesh, Settings, reconstruct
 from core.points import local_spacing
+from core.surface.quality import triangle_quality
 from tests import shapes
 
 DATA = Path(__file__).parents[1] / "data"
@@ -111,7 +112,8 @@ class TestResult:
         assert report["counts"]["input"] == report["counts"]["samples"] == 1500
         assert report["counts"]["nodes"] == sphere_run.field.values.size
         mesh = sphere_run.surface
-        assert report["meshes"] == {"double": {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": 0}}
+        counts = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": 0}
+        assert report["meshes"] == {"double": {**counts, **triangle_quality(mesh)}}
         assert {"points", "normals", "field", "surface"} <= report["seconds"].keys()
         assert all(seconds >= 0 for seconds in report["seconds"].values())
         assert report["spacing"] == pytest.approx(np.median(local_spacing(sphere_run.points)))
