@@ -77,9 +77,9 @@ need not be one and the same.
 
 ## Benchmark by category
 
-Published: means over 5 to 23 models each, most of 100k to 200k points, at 512 cells. Ours: means over {uniform_cases}
-cases, 100 to 200k points, at 128 cells, uniform samples. HD is times 1000 here, as everywhere else; the paper prints it
-without that factor.
+Published: means over 5 to 23 models each, most of 100k to 200k points, at 512 cells. Ours: means over the cases named,
+of {uniform_cases} in all, {fewest} to {most} points, at 128 cells, uniform samples. HD is times 1000 here, as
+everywhere else; the paper prints it without that factor.
 
 {categories}
 """
@@ -104,12 +104,15 @@ def write_page(docs: Path) -> Path:
         raise InputError(f"{docs} holds no results; make them with python -m benchmarks FOLDER --results")
     pages = list(dict.fromkeys(page for page, _ in runs))
     results = {where: {r["case"]: r for r in run["cases"] if "error" not in r} for where, run in runs.items()}
-    uniform = [result for (_, sampling), found in results.items() if sampling == "uniform" for result in found.values()]
+    uniform = {page: list(results.get((page, "uniform"), {}).values()) for page in pages}
+    points = [result["points"] for found in uniform.values() for result in found]
     text = _PAGE.format(
         pages=" and ".join(f"[{page}.md]({page}.md)" for page in pages),
         scripted="`python -m benchmarks.make_cases FOLDER`",
         samplings=" and ".join(f"*{sampling}*" for sampling in SAMPLINGS) + " samples",
-        uniform_cases=len(uniform),
+        uniform_cases=len(points),
+        fewest=f"{min(points):,}",
+        most=f"{max(points):,}",
         normals=_table(NORMALS, results, max, _nc),
         watertight=_table(WATERTIGHT, results, _least, _errors),
         non_watertight=_table(NON_WATERTIGHT, results, _least, _errors),
@@ -155,9 +158,11 @@ def _categories(uniform):
     head += ["F@.005: published", "ours", "F@.010: published", "ours", "our cases"]
     lines = [head, ["---", *["---:"] * 10, "---"]]
     for category, (vad, other) in CATEGORIES.items():
-        found = [result for result in uniform if _CATEGORY[category](result)]
+        by_page = {page: [r for r in cases if _CATEGORY[category](r)] for page, cases in uniform.items()}
+        found = [result for cases in by_page.values() for result in cases]
         cd, hd, near, far = (_mean(found, key, form) for key, form in _FORMS.items())
-        names = ", ".join(result["case"] for result in found) or ABSENT
+        named = [f"{PAGES[page]}: {', '.join(r['case'] for r in cases)}" for page, cases in by_page.items() if cases]
+        names = "; ".join(named) or ABSENT
         published = [f"{vad[0]:.3f}", f"{other[0]:.3f}", cd, f"{vad[1]:.1f}", f"{other[1]:.1f}", hd]
         lines.append([category, *published, f"{vad[2]:.4f}", near, f"{vad[3]:.4f}", far, names])
     return _markdown(lines)

@@ -27,7 +27,7 @@ def triangle_quality(mesh: Mesh) -> dict:
     areas = mesh.face_areas()
     angles = np.degrees(np.arctan2(4 * areas, middle + long - short))
     flatness = 4 / np.sqrt(3) * areas / np.maximum(long, np.finfo(float).tiny)  # one over the aspect ratio
-    flattest = np.percentile(flatness, 5)
+    flattest = np.percentile(flatness, 5, method="lower")
     values = (
         angles.mean(),
         angles.min(),

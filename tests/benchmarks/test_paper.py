@@ -13,6 +13,7 @@ def measured(case, category, cd, nc):
     return {
         "case": case,
         "category": category,
+        "points": 5_000,
         "mesh": {"cd": cd, "hd": 12.0, "f005": 0.99, "f010": 1.0},
         "normals": {"nc": nc},
     }
@@ -42,6 +43,7 @@ def test_runs_stand_beside_what_they_are_like(tmp_path):
     assert "| Bears | 0.9909 | 0.9873 | – | – | – |" in lines
     clothes = next(line for line in lines if line.startswith("| clothes"))
     assert "| 0.375 |" in clothes  # mean of both
+    assert clothes.endswith("| measured: cloth_10k; made by script: cloth_10k |")
 
 
 def test_without_runs_there_is_no_page(tmp_path):

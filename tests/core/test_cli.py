@@ -13,13 +13,14 @@ from plyfile import PlyData
 from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
 from core.field.steps import NearBand
 from core.io.openvdb_module import load_openvdb
-from core.io.points import read_points
+from core.io.ply import write_points
+from core.io.points import read_points, read_scan
 from core.settings import default_in_words, options
 
 ROOT = Path(__file__).parents[2]
 REPORT = {
     "settings": {},
-    "counts": {"samples": 4},
+    "counts": {"input": 400, "samples": 4},
     "seconds": {"normals": 1.0, "field": np.float64(0.5)},
     "warnings": [],
 }
@@ -92,6 +93,19 @@ def test_every_file_is_written_and_told(capsys, scan, calls, tmp_path):
     np.testing.assert_array_equal(calls[0][0], np.load(scan))
     assert len(PlyData.read(tmp_path / "deep" / "out" / "ball_double.ply")["face"]) == 1
     np.testing.assert_array_equal(read_points(tmp_path / "deep" / "out" / "ball_points.ply"), np.load(scan)[:4])
+
+
+def test_meshes_and_points_carry_what_the_scan_does(capsys, calls, tmp_path):
+    points, red = np.random.default_rng(0).normal(size=(400, 3)), np.arange(400).astype(np.uint8)
+    write_points(tmp_path / "scan.ply", points, points, {"red": red, "distance": red})
+    assert run(capsys, "reconstruct", tmp_path / "scan.ply", "-o", tmp_path / "out", "--surface", "both")[0] == 0
+    for ending, names in (("double", ["distance", "confidence", "red"]), ("points", ["confidence", "red"])):
+        found = read_scan(tmp_path / "out" / f"scan_{ending}.ply")[1]
+        assert list(found) == names
+        np.testing.assert_array_equal(found["red"], [0, 1, 2, 3])
+        np.testing.assert_array_equal(found["confidence"], 1)
+    assert (found := read_scan(tmp_path / "out" / "scan_single.ply")[1]).keys() == {"distance", "confidence", "red"}
+    assert (found["distance"] >= 1).all()  # the field is one, and the mesh beyond its box
 
 
 def test_json_is_all_there_is_on_stdout_and_equals_the_report_file(capsys, scan, calls, tmp_path):

@@ -10,7 +10,7 @@ from plyfile import PlyData
 
 from core import Mesh, VADError
 from core.io.ply import write_mesh, write_points
-from core.io.points import read_points
+from core.io.points import read_points, read_scan
 
 coordinates = st.floats(-1e12, 1e12)
 FAR_TETRAHEDRON = Mesh(
@@ -52,13 +52,30 @@ def test_an_empty_mesh(folder):
 @given(arrays(np.float64, st.tuples(st.integers(0, 5), st.just(7)), elements=coordinates), st.booleans())
 def test_points_come_back_with_normals_and_confidence(folder, table, confident):
     points, normals, confidence = table[:, :3], table[:, 3:6], table[:, 6] if confident else None
-    write_points(folder / "points.ply", points, normals, confidence)
+    write_points(folder / "points.ply", points, normals, {"confidence": confidence} if confident else None)
     vertex = PlyData.read(folder / "points.ply")["vertex"]
     assert [p.name for p in vertex.properties] == ["x", "y", "z", "nx", "ny", "nz"] + ["confidence"] * confident
     np.testing.assert_array_equal(np.stack([vertex[n] for n in ("x", "y", "z")], axis=1), points)
     np.testing.assert_array_equal(np.stack([vertex[n] for n in ("nx", "ny", "nz")], axis=1), np.float32(normals))
     if confident:
-        np.testing.assert_array_equal(vertex["confidence"], np.float32(confidence))
+        np.testing.assert_array_equal(vertex["confidence"], confidence)
+
+
+@pytest.mark.parametrize("order", "<>")
+def test_attributes_of_vertices_keep_their_type_and_come_back(folder, order):
+    given = {
+        "red": np.array([0, 7, 255, 1], np.uint8),
+        "scalar_Return_Number": np.array([-1, 2, 3, 4], order + "i4"),
+        "gps_time": np.array([1e9 + 1e-3, 0, 1, 2], order + "f8"),
+        "nx": np.ones(4, order + "f4"),
+    }
+    write_mesh(folder / "mesh.ply", FAR_TETRAHEDRON, given)
+    points, found = read_scan(folder / "mesh.ply")
+    np.testing.assert_array_equal(points, FAR_TETRAHEDRON.vertices)
+    assert list(found) == ["red", "scalar_Return_Number", "gps_time"]  # normals are not carried
+    for name, values in found.items():
+        np.testing.assert_array_equal(values, given[name])
+        assert values.dtype == given[name].dtype.newbyteorder("<")
 
 
 def test_a_failed_write_leaves_nothing(tmp_path):

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from plyfile import PlyData, PlyElement, PlyListProperty
 
 from core import InputError
-from core.io.points import read_points
+from core.io.points import read_points, read_scan
 
 FORMATS = {"ascii": dict(text=True), "little": dict(byte_order="<"), "big": dict(byte_order=">")}
 
@@ -90,6 +90,11 @@ def test_round_trip(folder, points, form, order, extra, listed, others):
         elements.append(faces(4))
     path = written(folder, ply(elements, **FORMATS[form]))
     np.testing.assert_array_equal(read_points(path), points.astype(np.float64))
+    found = read_scan(path)[1]
+    assert {name: values.dtype.str[1:] for name, values in found.items()} == {
+        name: kind for name, kind in extra if name != "nx"
+    }
+    assert all(len(values) == len(points) for values in found.values())
 
 
 @pytest.mark.parametrize("newline", [b"\n", b"\r\n", b"\r"])
