@@ -1,22 +1,39 @@
-"""VAD: unsigned distance fields and surfaces from points without normals, by Voronoi-assisted diffusion."""
+"""VAD: unsigned distance fields and surfaces from points without normals, by Voronoi-assisted diffusion.
 
-from .errors import Cancelled, InputError, MissingDependency, SettingsError, VADError
-from .field.distance_field import BandedField, DistanceField
-from .pipeline import reconstruct
-from .reconstruction import Reconstruction
-from .settings import Settings
-from .surface.mesh import Mesh
+Modules are loaded when a name of theirs is first asked for, so that settings and errors alone need no SciPy.
+"""
 
-__all__ = [
-    "BandedField",
-    "Cancelled",
-    "DistanceField",
-    "InputError",
-    "Mesh",
-    "MissingDependency",
-    "Reconstruction",
-    "Settings",
-    "SettingsError",
-    "VADError",
-    "reconstruct",
-]
+from importlib import import_module
+
+_PUBLIC = {
+    "cleaning.outliers": ("remove_outliers",),
+    "cleaning.positions": ("denoise",),
+    "errors": ("Cancelled", "InputError", "MissingDependency", "SettingsError", "VADError"),
+    "field.distance_field": ("BandedField", "DistanceField"),
+    "field.grid": ("fit_grid",),
+    "field.integration": ("distance_field",),
+    "field.local_surface": ("fit_local_surface",),
+    "normals.estimate": ("estimate_normals",),
+    "pipeline": ("reconstruct",),
+    "points": ("local_spacing",),
+    "reconstruction": ("Reconstruction",),
+    "settings": ("Settings",),
+    "surface.crossings": ("find_crossings",),
+    "surface.double_cover": ("double_cover",),
+    "surface.mesh": ("Mesh",),
+    "surface.sides": ("find_sides",),
+    "surface.signed": ("signed_distance",),
+    "surface.single_layer": ("single_layer",),
+}
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+
+
+def __dir__():
+    return __all__

@@ -64,6 +64,12 @@ def find_outliers(points, progress=None) -> np.ndarray:
     return stray
 
 
+def remove_outliers(points, progress=None) -> tuple[np.ndarray, np.ndarray]:
+    """The samples (n',3) of (n,3) that are no strays, and their rows (n',) int64, see :func:`find_outliers`."""
+    kept = np.flatnonzero(~find_outliers(points, progress))
+    return points[kept], kept
+
+
 class _Surroundings:
     """What the nearest neighbours of each sample look like."""
 

@@ -23,7 +23,7 @@ _ROUNDS = 2
 _SMOOTHING = 20  # rounds, over gaps
 
 
-def signed_distance(values, sides: Sides, surface: LocalSurface, place) -> np.ndarray | Blocks:
+def signed_distance(values, sides: Sides, surface: LocalSurface, place=np.asarray) -> np.ndarray | Blocks:
     """The distances `values` (nx,ny,nz) float32 or Blocks with the sign of their side: negative inside.
 
     place : function that takes positions (m,3) to the user's units, for messages
