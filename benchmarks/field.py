@@ -36,9 +36,10 @@ _PAGE = """\
 Made by `python -m benchmarks.field FOLDER`, which writes this page, its plots and the numbers behind it
 ([numbers.json](field/numbers.json)); do not edit it by hand. {versions}.
 
-Resolution 128 and defaults unless said, the whole box; shapes are scaled to a longest side of 0.8. u is read from the
-grid by trilinear interpolation, d is the exact distance to the true mesh. **Distances are times 1000** unless they are
-in cells (a cell is about 7.8). *Box*: 20,000 points uniform in the box. *Near*: as many within 0.05 of the surface.
+Resolution 128 and defaults unless said, the whole box; shapes are scaled to a longest side of 0.8. u is what
+`DistanceField.sample` reads from the grid: next to the surface from the nodes' steps to it, elsewhere trilinearly from
+their values. d is the exact distance to the true mesh. **Distances are times 1000** unless they are in cells (a cell is
+about 7.8). *Box*: 20,000 points uniform in the box. *Near*: as many within 0.05 of the surface.
 *Nodes*: the nodes of the grid next to the latter, where u is what the method gave and reading it costs nothing.
 
 ## What is met and what is not
@@ -47,9 +48,9 @@ in cells (a cell is about 7.8). *Box*: 20,000 points uniform in the box. *Near*:
 
 ## Beside simpler distances
 
-Mean |u − d|. The first three are read from the grid, all others are evaluated at the query itself. What that reading
-costs, most of it at the kink of u on the surface, is the last column: exact distances at the nodes, interpolated. At
-the nodes themselves all compare alike.
+Mean |u − d|. The first three are read from the grid, all others are evaluated at the query itself. What a grid of
+values alone can hold at best is the last column: exact distances at the nodes, interpolated, most of whose error is at
+the kink of u on the surface. At the nodes themselves all compare alike.
 
 - *ours*: the default. *Poisson*: the paper's integration (`integration="poisson"`). *grid*: the same with the paper's
   diffusion on the grid (`diffusion="grid"`), a dash where the grid or float64 cannot hold it. Its axes are those of the

@@ -22,7 +22,7 @@ def field_errors(field: DistanceField, truth: Mesh, samples: np.ndarray, seed: i
 
     box, near  : mean |u - d| x1e3 over points uniform in the box, and over points within NEAR of the true surface
     eikonal    : see :func:`eikonal_error`, over the box     angle : see :func:`angle_error`, near the surface
-    on_surface : mean u on the true surface, cells. Trilinear reading alone makes it 0.33 for exact nodes
+    on_surface : mean u on the true surface, cells. Exact nodes read trilinearly would make it 0.33
     above_share, above_max : see :func:`above_nearest_sample`
     """
     rng = np.random.default_rng(seed)

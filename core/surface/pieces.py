@@ -8,14 +8,34 @@ from scipy.spatial import KDTree
 from .mesh import Mesh
 
 _SAMPLE_AT = 1.5  # cells
+_FEW, _MANY = 8, 80  # samples
 
 
 def pieces_with_samples(mesh: Mesh, samples: KDTree, cell: float) -> Mesh:
-    """The mesh without the crumbs that a field may leave between sheets: pieces with no sample within 1.5 cells."""
-    touched = samples.query(mesh.vertices, distance_upper_bound=_SAMPLE_AT * cell, workers=-1)[0] < np.inf
+    """The mesh without the crumbs that a field may leave between sheets and in narrow places.
+
+    A piece has the samples nearest to its vertices within 1.5 cells. A crumb has none, or fewer than 8 that all lie
+    within 1.5 cells of a piece of 80 or more: what else is small stays, since no other piece shows it.
+    """
+    reach = _SAMPLE_AT * cell
+    distance, nearest = samples.query(mesh.vertices, distance_upper_bound=reach, workers=-1)
     ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(mesh.vertices),) * 2)
     count, piece = connected_components(graph, directed=False)
-    kept = np.bincount(piece, weights=touched, minlength=count)[piece] > 0
+    touched = distance < np.inf
+    of, sample = np.divmod(np.unique(piece[touched].astype(np.int64) * samples.n + nearest[touched]), samples.n)
+    number = np.bincount(of, minlength=count)
+    small = np.flatnonzero(number[of] < _FEW)
+    alone = ~_within(samples.data[sample[small]], mesh.vertices[number[piece] >= _MANY], reach)
+    kept = (number >= _FEW) | (np.bincount(of[small], alone, count) > 0)
+    kept = kept[piece]
     row = np.cumsum(kept) - 1
     return Mesh(mesh.vertices[kept], row[mesh.faces[kept[mesh.faces[:, 0]]]].astype(np.int32))
+
+
+def _within(points, others, reach):
+    """Which of a few points (m,3) have one of many others (v,3) within reach, (m,) bool."""
+    if not len(points) or not len(others):
+        return np.zeros(len(points), bool)
+    beside = KDTree(points).query(others, distance_upper_bound=reach, workers=-1)[0] < np.inf
+    return KDTree(others[beside]).query(points, distance_upper_bound=reach)[0] < np.inf

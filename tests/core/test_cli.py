@@ -104,7 +104,8 @@ def test_meshes_and_points_carry_what_the_scan_does(capsys, calls, tmp_path):
         assert list(found) == names
         np.testing.assert_array_equal(found["red"], [0, 1, 2, 3])
         np.testing.assert_array_equal(found["confidence"], 1)
-    assert (found := read_scan(tmp_path / "out" / "scan_single.ply")[1]).keys() == {"distance", "confidence", "red"}
+    found = read_scan(tmp_path / "out" / "scan_single.ply")[1]
+    assert found.keys() == {"distance", "confidence", "red"}
     assert (found["distance"] >= 1).all()  # the field is one, and the mesh beyond its box
 
 

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from core import Mesh
+from core import Mesh, Settings, reconstruct
 from core.surface.pieces import pieces_with_samples
+from tests import shapes
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
 
@@ -33,3 +34,50 @@ def test_one_sample_holds_a_whole_piece_and_vertices_are_renumbered():
 def test_nothing_left():
     mesh = pieces_with_samples(triangles([0, 0, 0]), KDTree([[9.0, 9, 9]]), 1.0)
     assert (mesh.vertices.shape, mesh.faces.shape) == ((0, 3), (0, 3))
+
+
+def strip(height, count):
+    """A strip of `count` triangles along x at this height: vertices and faces."""
+    along = np.arange(count + 2)
+    vertices = np.column_stack([0.5 * along, along % 2, np.full(count + 2, float(height))])
+    return vertices, np.stack([along[:-2], along[1:-1], along[2:]], axis=1)
+
+
+def joined(*parts):
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    faces = [faces + start for (_, faces), start in zip(parts, first, strict=False)]
+    return Mesh(np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces).astype(np.int32))
+
+
+@pytest.mark.parametrize(("count", "kept"), [(6, False), (8, True)])
+def test_a_piece_along_few_samples_of_a_large_one_is_a_crumb(count, kept):
+    """A large strip of samples and, half a cell above it, a small one."""
+    large, small = strip(0, 100), strip(0.5, count - 2)
+    mesh = joined(large, small)
+    found = pieces_with_samples(mesh, KDTree(large[0]), 1.0)
+    assert len(found.vertices) == len(large[0]) + (len(small[0]) if kept else 0)
+
+
+def test_a_small_piece_stays_where_one_of_its_samples_has_no_large_one():
+    large, small = strip(0, 100), strip(1, 4)
+    mesh = joined(large, small)
+    assert len(pieces_with_samples(mesh, KDTree(large[0]), 1.0).vertices) == len(large[0])
+    beyond = np.concatenate([large[0], [[0, 0, 1.8]]])  # within 1.5 cells of the small one alone
+    assert len(pieces_with_samples(mesh, KDTree(beyond), 1.0).vertices) == len(mesh.vertices)
+
+
+def test_small_pieces_along_each_other_stay():
+    """As the two layers of a tiny part do."""
+    mesh = joined(strip(0, 4), strip(0.5, 4), strip(90, 200))
+    assert len(pieces_with_samples(mesh, KDTree(mesh.vertices), 1.0).vertices) == len(mesh.vertices)
+
+
+def test_a_tiny_part_beside_a_large_one_keeps_both_its_layers():
+    ball = shapes.sphere(14, 0.2)
+    run = reconstruct(
+        np.concatenate([shapes.sphere(1000), ball + [1.5, 0, 0]]), Settings(resolution=64, outliers=False)
+    )
+    pieces = shapes.components(run.surface)
+    assert [shapes.euler(piece) for piece in pieces] == [2, 2, 2, 2]
+    assert [np.sign(shapes.signed_volume(piece)) for piece in pieces] == [1, -1, 1, -1]
+    assert len(np.unique(KDTree(run.points).query(pieces[3].vertices)[1])) < 15
