@@ -18,6 +18,7 @@ _PUBLIC = {
     "points": ("local_spacing",),
     "reconstruction": ("Reconstruction",),
     "settings": ("Settings",),
+    "surface.attributes": ("vertex_attributes",),
     "surface.crossings": ("find_crossings",),
     "surface.double_cover": ("double_cover",),
     "surface.mesh": ("Mesh",),

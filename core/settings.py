@@ -62,6 +62,12 @@ class Settings:
         "and normals only)",
         choices=("double", "single", "both", "signed", "none"),
     )
+    pieces: float = _option(
+        0.0,
+        "Leave pieces out of a mesh that have less than this share of its largest piece's area, floating scraps for "
+        "instance. Crumbs that show nothing of their own go in any case",
+        limits=(0.0, 1.0),
+    )
     solver: str = _option(
         "reflection",
         "How normals are found: by reflections across the Voronoi bisectors, by minimising the published energy on "

@@ -13,6 +13,7 @@ from ..settings import Settings
 from .crossings import find_crossings
 from .double_cover import double_cover
 from .mesh import Mesh
+from .pieces import without_small_pieces
 from .sides import find_sides, needed_band
 from .signed import signed_distance, signed_mesh
 from .single_layer import single_layer
@@ -75,4 +76,5 @@ def extract_surfaces(
                 f"the signed surface, which spans openings of {sides.spanned:.1%} of its area; compare it with the "
                 "single layer"
             )
+    meshes = {kind: without_small_pieces(mesh, settings.pieces) for kind, mesh in meshes.items()}
     return Surfaces(values, meshes, tuple(warnings)).placed(place)

@@ -19,16 +19,34 @@ def pieces_with_samples(mesh: Mesh, samples: KDTree, cell: float) -> Mesh:
     """
     reach = _SAMPLE_AT * cell
     distance, nearest = samples.query(mesh.vertices, distance_upper_bound=reach, workers=-1)
-    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(mesh.vertices),) * 2)
-    count, piece = connected_components(graph, directed=False)
+    count, piece = _pieces(mesh)
     touched = distance < np.inf
     of, sample = np.divmod(np.unique(piece[touched].astype(np.int64) * samples.n + nearest[touched]), samples.n)
     number = np.bincount(of, minlength=count)
     small = np.flatnonzero(number[of] < _FEW)
     alone = ~_within(samples.data[sample[small]], mesh.vertices[number[piece] >= _MANY], reach)
     kept = (number >= _FEW) | (np.bincount(of[small], alone, count) > 0)
-    kept = kept[piece]
+    return _only(mesh, kept[piece])
+
+
+def without_small_pieces(mesh: Mesh, share: float) -> Mesh:
+    """The mesh without the pieces of less than `share` of its largest piece's area."""
+    if share == 0 or not len(mesh.faces):
+        return mesh
+    count, piece = _pieces(mesh)
+    area = np.bincount(piece[mesh.faces[:, 0]], mesh.face_areas(), count)
+    return _only(mesh, (area >= share * area.max())[piece])
+
+
+def _pieces(mesh):
+    """How many connected pieces there are, and that of each vertex, (v,)."""
+    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(mesh.vertices),) * 2)
+    return connected_components(graph, directed=False)
+
+
+def _only(mesh, kept):
+    """The pieces of the vertices marked in `kept`, (v,) bool."""
     row = np.cumsum(kept) - 1
     return Mesh(mesh.vertices[kept], row[mesh.faces[kept[mesh.faces[:, 0]]]].astype(np.int32))
 

@@ -16,18 +16,38 @@ from .signed import signed_mesh
 from .triangles import triangles
 
 _ROUNDS = 2
+_MEETING = 0.01  # share of crossings at meetings of sheets
+_PINHOLES = 1e-3  # share of edges that may be open in a surface that is as good as closed
 _STIFFNESS = 0.05  # of vertices against moving along what their planes leave open
 
 
 def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None):
     """The surface as one sheet: the boundary of the inside, where that is the whole surface; else :func:`dual_contour`.
 
+    Where a closed surface crosses itself, the boundary of the inside turns off before the crossing on either side. The
+    dual contour goes through, and is taken if it is as good as closed.
+
     values : (nx,ny,nz) float32 or Blocks, unsigned distances
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
-    if sides.complete:
+    progress = Progress.of(progress)
+    if sides.complete and not _cross(crossings):
         return signed_mesh(sides.sign(values), surface, grid, progress), 0
-    return orient(dual_contour(crossings, surface, grid, progress))
+    mesh = dual_contour(crossings, surface, grid, progress.part(0.0, 0.6))
+    if sides.complete and _open_share(mesh) > _PINHOLES:
+        return signed_mesh(sides.sign(values), surface, grid, progress.part(0.6, 1.0)), 0
+    return orient(mesh)
+
+
+def _cross(crossings):
+    """Whether sheets meet in more than a stray place or two."""
+    return len(crossings.node) > 0 and (crossings.normal != 0).any(axis=1).mean() > _MEETING
+
+
+def _open_share(mesh):
+    """Share of edges with a single face."""
+    _, count = mesh.edge_counts()
+    return (count == 1).mean() if len(count) else 1.0
 
 
 def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:

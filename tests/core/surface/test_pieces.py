@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Mesh, Settings, reconstruct
-from core.surface.pieces import pieces_with_samples
+from core.surface.pieces import pieces_with_samples, without_small_pieces
 from tests import shapes
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
@@ -73,11 +73,38 @@ def test_small_pieces_along_each_other_stay():
 
 
 def test_a_tiny_part_beside_a_large_one_keeps_both_its_layers():
-    ball = shapes.sphere(14, 0.2)
-    run = reconstruct(
-        np.concatenate([shapes.sphere(1000), ball + [1.5, 0, 0]]), Settings(resolution=64, outliers=False)
-    )
+    ball = shapes.sphere(14, 0.2) + np.array([1.5, 0, 0])
+    run = reconstruct(np.concatenate([shapes.sphere(1000), ball]), Settings(resolution=64, outliers=False))
     pieces = shapes.components(run.surface)
     assert [shapes.euler(piece) for piece in pieces] == [2, 2, 2, 2]
     assert [np.sign(shapes.signed_volume(piece)) for piece in pieces] == [1, -1, 1, -1]
     assert len(np.unique(KDTree(run.points).query(pieces[3].vertices)[1])) < 15
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0, 3), (0.24, 3), (0.26, 2), (1, 2)])
+def test_pieces_below_a_share_of_the_largest_go(share, kept):
+    """Two strips of a hundred triangles and one of a quarter of that."""
+    mesh = joined(strip(0, 100), strip(5, 25), strip(9, 100))
+    found = shapes.components(without_small_pieces(mesh, share))
+    assert [len(piece.faces) for piece in found] == [100, 100, 25][:kept]
+
+
+def test_area_counts_not_faces():
+    vertices, faces = strip(0, 4)
+    mesh = joined((vertices * 10, faces), strip(50, 300))
+    assert [len(piece.faces) for piece in shapes.components(without_small_pieces(mesh, 0.9))] == [4]
+
+
+def test_no_pieces_at_all():
+    assert len(without_small_pieces(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)), 0.5).faces) == 0
+
+
+@pytest.mark.parametrize("surface", ["double", "single", "signed"])
+def test_the_setting_leaves_a_small_ball_out(surface):
+    ball = shapes.sphere(100, 0.3) + np.array([1.6, 0, 0])
+    points = np.concatenate([shapes.sphere(1000), ball])
+    for share, right in ((0.0, 1.9), (0.5, 1.0)):
+        run = reconstruct(points, Settings(resolution=48, surface=surface, pieces=share))
+        mesh = run.sheet if surface == "single" else run.surface
+        assert mesh.vertices[:, 0].max() == pytest.approx(right, abs=0.05)
+        assert run.report["meshes"][surface]["vertices"] == len(mesh.vertices)

@@ -14,7 +14,8 @@ def triangles(*corners):
 EVEN = [[0, 0], [1, 0], [0.5, 3**0.5 / 2]]
 RIGHT = [[0, 0], [3, 0], [0, 3]]
 NEEDLE = [[0, 0], [1, 0], [1, np.tan(np.radians(2))]]
-BLUNT = [[0, 0], [2, 0], [1, np.tan(np.radians(4))]]
+BLUNT = [[0, 0], [2, 0], [1, np.tan(np.radians(4.9))]]
+BLUNTER = [[0, 0], [2, 0], [1, np.tan(np.radians(5.1))]]
 FLAT = [[0, 0], [1, 0], [3, 0]]
 
 
@@ -26,7 +27,12 @@ def test_even_triangles():
 
 @pytest.mark.parametrize(
     ("corners", "angle", "aspect"),
-    [(RIGHT, 45, np.sqrt(3)), (NEEDLE, 2, np.sqrt(3) / np.sin(np.radians(4))), (BLUNT, 4, np.sqrt(3) / 0.0699268)],
+    [
+        (RIGHT, 45, np.sqrt(3)),
+        (NEEDLE, 2, np.sqrt(3) / np.sin(np.radians(4))),
+        (BLUNT, 4.9, np.sqrt(3) / 0.0857301),
+        (BLUNTER, 5.1, np.sqrt(3) / 0.0892473),
+    ],
 )
 def test_closed_forms_whichever_corner_comes_first(corners, angle, aspect):
     """The longest side over the height on it, times sqrt(3) / 2: a needle's is cos(2) sin(2) of its side."""
@@ -39,7 +45,7 @@ def test_closed_forms_whichever_corner_comes_first(corners, angle, aspect):
 
 def test_shares_and_the_mean():
     found = triangle_quality(triangles(*[RIGHT] * 7, NEEDLE, BLUNT, FLAT))
-    assert found["min_angle"] == pytest.approx((7 * 45 + 2 + 4) / 10)
+    assert found["min_angle"] == pytest.approx((7 * 45 + 2 + 4.9) / 10)
     assert (found["least_angle"], found["small_angles"], found["zero_area"]) == (0, 0.3, 0.1)
     assert found["aspect_p95"] is None
 

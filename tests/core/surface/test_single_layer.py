@@ -191,3 +191,18 @@ def backward_edges(mesh):
     """Edges that both their faces run through in the same direction."""
     directed = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     return len(directed) - len(np.unique(directed, axis=0))
+
+
+def test_a_closed_surface_that_crosses_itself_is_followed_through_the_crossing():
+    """Two balls through each other: the inside of one of them alone has a boundary, too, that turns off there."""
+    points = np.concatenate([shapes.scattered_sphere(4000) + [side, 0, 0] for side in (-0.6, 0.6)])
+    result = reconstruct(points, Settings(resolution=64, surface="single", denoise=0))
+    cell, sheet = result.field.spacing, result.sheet
+    edges, count = sheet.edge_counts()
+    assert (count == 1).mean() < 2e-3
+    meeting = sheet.vertices[edges[count > 2]].reshape(-1, 3)
+    assert len(meeting) > 40
+    turn = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    circle = 0.8 * np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=1)
+    assert KDTree(circle).query(meeting)[0].max() < 2 * cell
+    assert np.median(KDTree(sheet.vertices).query(circle)[0]) < 0.6 * cell
