@@ -195,7 +195,8 @@ def backward_edges(mesh):
 
 def test_a_closed_surface_that_crosses_itself_is_followed_through_the_crossing():
     """Two balls through each other: the inside of one of them alone has a boundary, too, that turns off there."""
-    points = np.concatenate([shapes.scattered_sphere(4000) + [side, 0, 0] for side in (-0.6, 0.6)])
+    ball = shapes.scattered_sphere(4000)
+    points = np.concatenate([ball - np.array([0.6, 0, 0]), ball + np.array([0.6, 0, 0])])
     result = reconstruct(points, Settings(resolution=64, surface="single", denoise=0))
     cell, sheet = result.field.spacing, result.sheet
     edges, count = sheet.edge_counts()
