@@ -1,6 +1,5 @@
 """docs/field.md: `python -m benchmarks.field FOLDER` measures the distance field and writes the page."""
 
-import argparse
 import platform
 import sys
 from importlib.metadata import version
@@ -23,7 +22,7 @@ from .field_quality import FIELD, SLICED, case_fields, densities, density_slices
 from .field_rims import rims
 from .field_verdicts import verdicts
 from .peers import check_open3d
-from .status import DONE, exit_status
+from .status import page_command
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CLOSED, OPEN, BAND = "spot_10k", "cloth_10k", "moebius_5k"
@@ -145,20 +144,13 @@ The paper's grid is a cube of the resolution given, ours has this many cells alo
 
 def main(arguments: list[str] | None = None) -> int:
     """Run on `arguments` (default: those of the process) and return the exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.field",
-        description="Measure the distance field on every case of a folder and write docs/field.md.",
-        epilog="exit status: 0 done, 2 bad input (one line says what), 130 cancelled",
+    return page_command(
+        arguments,
+        "field",
+        "Measure the distance field on every case of a folder and write docs/field.md.",
+        f"holds the cases, .npz files, with {', '.join((CLOSED, OPEN, BAND))}",
+        lambda folder: write_page(*measure(folder), DOCS),
     )
-    needed = ", ".join((CLOSED, OPEN, BAND))
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help=f"holds the cases, .npz files, with {needed}")
-    given = parser.parse_args(arguments)
-
-    def command():
-        print(f"wrote {write_page(*measure(given.folder), DOCS)}")
-        return DONE
-
-    return exit_status(command)
 
 
 def measure(folder: Path) -> tuple[dict, dict]:

@@ -1,6 +1,5 @@
 """docs/normals.md: `python -m benchmarks.normals FOLDER` measures the axes of stage one and writes the page."""
 
-import argparse
 import platform
 import sys
 from collections.abc import Iterator
@@ -30,7 +29,7 @@ from .normal_quality import (
 from .peers import check_open3d
 from .plots import plot_convergence, plot_growth
 from .report import Column, markdown_table
-from .status import DONE, exit_status
+from .status import page_command
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -123,19 +122,13 @@ From 10,000 points on, CPU time grows as n^{stage_exponent:.2f}; Delaunay alone 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run on `arguments` (default: those of the process) and return the exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.normals",
-        description="Measure the normals of every case of a folder and write docs/normals.md.",
-        epilog="exit status: 0 done, 2 bad input (one line says what), 130 cancelled",
+    return page_command(
+        arguments,
+        "normals",
+        "Measure the normals of every case of a folder and write docs/normals.md.",
+        f"holds the cases, .npz files, {SHAPE} among them",
+        lambda folder: write_page(measure(folder), DOCS),
     )
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help=f"holds the cases, .npz files, {SHAPE} among them")
-    given = parser.parse_args(arguments)
-
-    def command():
-        print(f"wrote {write_page(measure(given.folder), DOCS)}")
-        return DONE
-
-    return exit_status(command)
 
 
 def measure(folder: Path) -> dict:

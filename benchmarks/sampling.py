@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.spatial import KDTree
 
+from core.voronoi.bisectors import greedy_choice
+
 from .shapes.surface import Surface, sample
 
 _CANDIDATES = 10  # per point of a blue-noise sampling
@@ -58,13 +60,4 @@ def wires(surface: Surface, count: int, rng: np.random.Generator, planes: int = 
 def _apart(points, radius):
     """Rows kept when points come one by one and those closer than `radius` to a kept one are turned away."""
     first, second = KDTree(points).query_pairs(radius, output_type="ndarray").T  # first < second
-    waiting, kept = np.ones(len(points), bool), np.zeros(len(points), bool)
-    while waiting.any():
-        ready = waiting.copy()
-        ready[second] = False
-        kept |= ready
-        waiting &= ~ready
-        waiting[second[ready[first]]] = False
-        open_pairs = waiting[first] & waiting[second]
-        first, second = first[open_pairs], second[open_pairs]
-    return np.flatnonzero(kept)
+    return greedy_choice(len(points), first, second)

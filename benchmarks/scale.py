@@ -1,6 +1,5 @@
 """docs/scale.md: `python -m benchmarks.scale FOLDER` measures how cost grows with the grid and with the points."""
 
-import argparse
 import platform
 import sys
 from collections.abc import Iterator
@@ -18,7 +17,7 @@ from .cases import find_cases, load_case
 from .geometry import surface_points
 from .peers import Clock, check_open3d, poisson
 from .processes import run_fresh
-from .status import DONE, exit_status
+from .status import page_command
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -71,19 +70,13 @@ grows as the number of points to the power of **{by_points:.2f}**.
 
 def main(arguments: list[str] | None = None) -> int:
     """Run on `arguments` (default: those of the process) and return the exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.scale",
-        description="Measure runs on large grids, in the whole box and in bands, and write docs/scale.md.",
-        epilog="exit status: 0 done, 2 bad input (one line says what), 130 cancelled",
+    return page_command(
+        arguments,
+        "scale",
+        "Measure runs on large grids, in the whole box and in bands, and write docs/scale.md.",
+        f"holds the case {SHAPE}.npz",
+        lambda folder: write_page(measure(folder), DOCS),
     )
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help=f"holds the case {SHAPE}.npz")
-    given = parser.parse_args(arguments)
-
-    def command():
-        print(f"wrote {write_page(measure(given.folder), DOCS)}")
-        return DONE
-
-    return exit_status(command)
 
 
 def measure(folder: Path) -> dict:

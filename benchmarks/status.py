@@ -1,7 +1,9 @@
-"""Exit statuses of the benchmarks' commands."""
+"""What the benchmarks' commands share: exit statuses, and the command of a module that writes one page."""
 
+import argparse
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 from core import VADError
 
@@ -19,3 +21,21 @@ def exit_status(command: Callable[[], int]) -> int:
     except KeyboardInterrupt:
         print("error: cancelled", file=sys.stderr)
         return CANCELLED
+
+
+def page_command(arguments: list[str] | None, module: str, description: str, needs: str, write: Callable) -> int:
+    """Run `write`, a function of the folder of cases that writes a page and returns its path, on `arguments` (None:
+    those of the process), and return the exit status. `needs` says what the folder holds."""
+    parser = argparse.ArgumentParser(
+        prog=f"python -m benchmarks.{module}",
+        description=description,
+        epilog="exit status: 0 done, 2 bad input (one line says what), 130 cancelled",
+    )
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help=needs)
+    given = parser.parse_args(arguments)
+
+    def command():
+        print(f"wrote {write(given.folder)}")
+        return DONE
+
+    return exit_status(command)

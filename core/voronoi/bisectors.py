@@ -48,7 +48,9 @@ def bisector_samples(polygons: FacetPolygons, spacing: np.ndarray, density: floa
     apart = side * np.sqrt(_PACKING / density)
     layered = np.column_stack([candidates / apart[facet, None], 2.0 * facet])
     rivals = KDTree(layered).query_pairs(1.0, output_type="ndarray")
-    kept = _greedy(len(candidates), rivals, rng)
+    rank = rng.permutation(len(candidates))
+    earlier, later = np.where((rank[rivals[:, 0]] < rank[rivals[:, 1]])[:, None], rivals, rivals[:, ::-1]).T
+    kept = greedy_choice(len(candidates), earlier, later)
     facet = facet[kept]
     weight = facets.area / np.bincount(facet, minlength=len(facets.pairs))
     return BisectorSamples(facets, candidates[kept], facet, weight[facet])
@@ -68,10 +70,9 @@ def _uniform(polygons, count, rng):
     return (1 - root) * apex + root * ((1 - share) * a + share * b), facet
 
 
-def _greedy(count, rivals, rng):
-    """Indices, rising, that greedy choice in a random order keeps when no two of a rival pair may stay."""
-    rank = rng.permutation(count)
-    earlier, later = np.where((rank[rivals[:, 0]] < rank[rivals[:, 1]])[:, None], rivals, rivals[:, ::-1]).T
+def greedy_choice(count: int, earlier: np.ndarray, later: np.ndarray) -> np.ndarray:
+    """Indices, rising, that are kept of `count` when of each pair of rivals, (r,) int each, at most one may stay and
+    they choose in turn, `earlier` before `later`."""
     kept, open_ = np.zeros(count, bool), np.ones(count, bool)
     while open_.any():
         won = open_.copy()
