@@ -47,7 +47,8 @@ so only the latter are worth comparing, and only within a run.
   the direction from the closest true point, from 1.5 cells to 0.05 away. *u on surface*: mean u there, in cells; a
   trilinear reading of exact values at the nodes would give 0.33. *above*: share of nodes where u exceeds the distance
   to the nearest sample, and by how many cells at most; it never should. *u/d 4, 8, 16*: u over the exact distance at
-  so many cells past an open rim: mean (5th to 95th percentile), 1 is perfect, below 1 means that the sheet leaks past its end.
+  so many cells past an open rim: mean (5th to 95th percentile), 1 is perfect, below 1 means that the sheet leaks past
+  its end.
 - **Integration**: the same errors with the paper's Poisson equation in place of the default.
 - **Cost**: share of the time of each stage; peak memory of the process (each case has its own, Python and libraries
   included); time over that of *Poisson* below, by the clock and in CPU time, which feels other work on the machine
