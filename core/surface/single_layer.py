@@ -10,6 +10,7 @@ from .holes import fill_pinholes
 from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
+from .rims import smooth_rims
 from .sharing import shared_vertices
 from .sides import Sides
 from .signed import signed_mesh
@@ -55,7 +56,8 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
 
     Every cell that the surface passes has one vertex, the mean of its crossings taken to its foot point, but one for
     each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two. Where sheets
-    meet, vertices are put where the planes of their crossings meet. What pinholes are left are closed.
+    meet, vertices are put where the planes of their crossings meet. What pinholes are left are closed, and
+    borders smoothed.
     """
     progress = Progress.of(progress)
     quads, count, kind = shared_vertices(crossings, grid)
@@ -70,7 +72,7 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
         vertices[free] -= surface.project(vertices[free], part).step
     mesh = _without_repeats(Mesh(vertices, triangles(vertices, quads)))
     mesh = pieces_with_samples(mesh, surface.tree, grid.spacing)
-    return fill_pinholes(mesh, surface, grid.spacing)
+    return smooth_rims(fill_pinholes(mesh, surface, grid.spacing), surface, grid.spacing)
 
 
 def _to_planes(vertices, corner, place, normal, grid):

@@ -1,0 +1,118 @@
+"""The borders of a single layer, made as smooth along themselves as the samples allow.
+
+Dual contouring ends a sheet at whole cells, and a local surface's rims run through its outermost samples; both leave
+borders that zigzag. Here each border is faired: the step d off its vertices' places x minimises the integral of
+d^2 + (s^2 (x + d)'')^2 along it, an implicit step of bi-Laplacian flow (Desbrun et al., SIGGRAPH 1999) in arc length,
+which keeps what is longer than about six smoothing lengths s and does not shorten the border as Laplacian flow does.
+Reweighting keeps corners, where the faired border turns fast, and holds back vertices that go far.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import spsolve
+
+from ..field.local_surface import LocalSurface
+from ..linalg import COMPONENTS, principal_axes
+from .mesh import Mesh
+
+_LENGTH = 1.5  # smoothing length, local spacings
+_FARTHEST = 0.3  # local spacings, no border moves further
+_CORNER = 0.5  # radians over the smoothing length, a border that turns faster has a corner
+_REWEIGHTED = 6
+_SHORTEST = 0.2  # cells, shorter edges count as this long
+_ROWS, _CLEAR = 2, 2  # beside borders, that are evened out, and beside edges where sheets meet, that are not
+_STRETCH, _MOST = 2.0, 90  # further rows for every cell that borders move, at this percentile
+_RELAXED, _DAMPING = 10, 0.5
+
+
+def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
+    """The mesh with its borders smoothed along the surface and the rows of vertices beside them evened out.
+
+    cell : the grid's
+
+    Border vertices move in the surface, by 0.3 local spacings at most; the rows beside them follow, so that triangles
+    do not get thin. Vertices of edges with three faces or more stay, and so do those where borders touch and the rows
+    next to where sheets meet. The faces are the same.
+    """
+    edges, counts = mesh.edge_counts()
+    border, n = edges[counts == 1], len(mesh.vertices)
+    ends = np.bincount(border.reshape(-1), minlength=n)
+    fixed = np.zeros(n, bool)
+    fixed[edges[counts > 2]] = True
+    loop = np.flatnonzero((ends == 2) & ~fixed)
+    if not len(loop):
+        return mesh
+    vertices, axis, beside = mesh.vertices.copy(), _axes(mesh), _neighbours(border, loop)
+    spacing = surface.spacing[surface.tree.query(vertices[loop], workers=-1)[1]]
+    step = _fairing(vertices, loop, beside, spacing, cell)
+    step -= np.einsum("li,li->l", step, axis[loop])[:, None] * axis[loop]
+    length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(float).tiny)
+    vertices[loop] += step * np.minimum(1.0, _FARTHEST * spacing / length)[:, None]
+    _settle(vertices, loop, axis, surface)
+
+    moved = vertices - mesh.vertices
+    rows = _ROWS + int(np.ceil(_STRETCH * np.percentile(np.linalg.norm(moved[loop], axis=1), _MOST) / cell))
+    graph = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
+    graph = graph + graph.T
+    row = np.flatnonzero(_grown(ends > 0, graph, rows) & ~_grown(fixed, graph, _CLEAR) & (ends == 0))
+    if not len(row):
+        return Mesh(vertices, mesh.faces)
+    graph = graph[row]
+    degree = np.diff(graph.indptr).astype(float)
+    vertices[row] += spsolve((diags(degree) - graph[:, row]).tocsc(), graph @ moved)
+    for _ in range(_RELAXED):
+        vertices[row] += _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
+        _settle(vertices, row, axis, surface)
+    return Mesh(vertices, mesh.faces)
+
+
+def _axes(mesh):
+    """Normals (v,3) of the vertices, of either sign, whichever way the faces are wound."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.sqrt(np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny))[:, None]
+    corner = mesh.faces.reshape(-1)
+    products = [np.repeat(normal[:, i] * normal[:, j], 3) for i, j in COMPONENTS]
+    tensors = [np.bincount(corner, product, len(mesh.vertices)) for product in products]
+    return principal_axes(np.stack(tensors, axis=1))[0]
+
+
+def _neighbours(border, loop):
+    """The vertices before and after each of `loop` (l,), which have two border edges (e,2) each, (l,2)."""
+    tail, head = np.concatenate([border, border[:, ::-1]]).T
+    order = np.argsort(tail, kind="stable")
+    first = np.searchsorted(tail[order], loop)
+    return head[order][first[:, None] + np.arange(2)]
+
+
+def _fairing(vertices, loop, beside, spacing, cell):
+    """Steps (l,3) that fair the borders."""
+    at, every = vertices[loop], np.arange(len(loop))
+    h = np.maximum(np.linalg.norm(vertices[beside] - at[:, None], axis=2), _SHORTEST * cell)
+    mass = h.mean(axis=1)
+    column = np.concatenate([loop, beside[:, 0], beside[:, 1]])
+    value = np.concatenate([-(1 / h).sum(axis=1), *(1 / h).T])
+    turn = coo_matrix((value, (np.tile(every, 3), column)), shape=(len(loop), len(vertices))).tocsr()
+    held, weight = mass.copy(), np.ones(len(loop))  # x'' is turn @ x / mass
+    there, size = turn @ vertices, _LENGTH * spacing
+    turn = turn[:, loop]
+    for _ in range(_REWEIGHTED):
+        stiff = turn.T @ diags(weight * size**4 / mass)
+        step = spsolve((diags(held) + stiff @ turn).tocsc(), -(stiff @ there))
+        angle = np.linalg.norm(there + turn @ step, axis=1) * size / mass
+        weight = 1 / (1 + (angle / _CORNER) ** 4)
+        held *= np.maximum(1.0, np.linalg.norm(step, axis=1) / (_FARTHEST * spacing))
+    return step
+
+
+def _grown(chosen, graph, rows):
+    """Vertices (v,) bool and those up to so many edges away."""
+    for _ in range(rows):
+        chosen = chosen | (graph @ chosen > 0)
+    return chosen
+
+
+def _settle(vertices, row, axis, surface):
+    """Take vertices back onto the surface along their normals, in place, past its rims too."""
+    step = surface.project(vertices[row]).step
+    vertices[row] -= np.einsum("vi,vi->v", step, axis[row])[:, None] * axis[row]
