@@ -4,7 +4,8 @@ Near the surface the blended projection distance is accurate and is kept. Furthe
 equation, see :mod:`poisson`. By default the distance is carried from the foot points of the near nodes instead, which
 errs less, most of all at the medial axis, and needs no linear solve: every node takes the foot of the nearest such node
 (an exact Euclidean distance transform finds it), compares it with the feet its neighbours hold, and keeps the closest
-(vector distance propagation; P.-E. Danielsson, Computer Graphics and Image Processing 14, 1980).
+(vector distance propagation; P.-E. Danielsson, Computer Graphics and Image Processing 14, 1980). The distance is then
+that to the disc of this foot alone: the least of many discs' is too small where the feet scatter.
 """
 
 from functools import partial
@@ -80,7 +81,7 @@ def _transport(grid, node, feet, progress):
     nearest = distance_transform_edt(row < 0, return_distances=False, return_indices=True)
     row = row[tuple(nearest)]
     del nearest
-    values = np.full(grid.shape, np.inf, np.float32)
+    values = np.empty(grid.shape, np.float32)
     changed = np.ones(grid.shape, bool)
     for turn in range(_ROUNDS):
         held = row.copy()
@@ -92,17 +93,18 @@ def _transport(grid, node, feet, progress):
 
 
 def _take_closest(grid, feet, row, changed, held, values, slab):
-    """Where a foot of a neighbour that changed is closer than a node's own, put it into `held` and its distance into
-    `values`."""
-    at, mine, best = _positions(grid, slab).reshape(3, -1), held[slab].reshape(-1), values[slab].reshape(-1)
-    np.minimum(best, feet.distance(at, mine), out=best)
+    """Where a foot of a neighbour that changed is closer than a node's own, put it into `held`; then the distances to
+    the feet's discs into `values`."""
+    at, mine = _positions(grid, slab).reshape(3, -1), held[slab].reshape(-1)
+    best = feet.squared(at, mine)
     for other, fresh in zip(_neighbours(row, slab), _neighbours(changed, slab), strict=True):
         other = other.reshape(-1)
         tried = np.flatnonzero(fresh.reshape(-1) & (other != mine))
-        distance = feet.distance(at[:, tried], other[tried])
-        closer = distance < best[tried]
+        squared = feet.squared(at[:, tried], other[tried])
+        closer = squared < best[tried]
         tried = tried[closer]
-        best[tried], mine[tried] = distance[closer], other[tried]
+        best[tried], mine[tried] = squared[closer], other[tried]
+    values[slab] = feet.distance(at, mine).reshape(values[slab].shape)
 
 
 def _slabs(grid):
