@@ -66,8 +66,8 @@ def _fit(offset, distance):
         height = np.einsum("mki,mi->mk", offset, normal)
         basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
         weighted = basis * share[..., None]
-        inverse = np.linalg.inv(weighted.transpose(0, 2, 1) @ basis + _STIFFNESS * np.eye(COEFFICIENTS))
-        coefficients = np.einsum("mab,mb->ma", inverse, np.einsum("mka,mk->ma", weighted, height))
+        matrix = weighted.transpose(0, 2, 1) @ basis + _STIFFNESS * np.eye(COEFFICIENTS)
+        coefficients = _solve(matrix, np.einsum("mka,mk->ma", weighted, height))
         residual = height - np.einsum("mka,ma->mk", basis, coefficients)
         full = 1.0 / weight.sum(axis=1)  # the share of a sample that lies on its quadric
         scale = _CAUCHY * 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
@@ -77,4 +77,11 @@ def _fit(offset, distance):
     upright = normal - np.einsum("ma,mai->mi", slope, frame)
     squared = np.einsum("mi,mi->m", upright, upright)
     step = (coefficients[:, 0] / squared)[:, None] * upright
-    return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(inverse[:, 0, 0] * full, 0.95)
+    leverage = full * _solve(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
+    return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95)
+
+
+def _solve(matrix, right):
+    """Solutions of many small systems, one right side (m,c) each. OpenBLAS starts threads for every one that has two
+    or is inverted, which takes ten times as long, and hundreds of times on a busy machine."""
+    return np.linalg.solve(matrix, right[..., None])[..., 0]
