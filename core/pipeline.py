@@ -42,7 +42,7 @@ def reconstruct(
     >>> sphere = np.random.default_rng(0).normal(size=(500, 3))
     >>> sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
     >>> result = reconstruct(sphere, Settings(resolution=32, surface="none"))
-    >>> abs(result.field.sample([[0, 0, 1.5]])[0] - 0.5) < 0.01
+    >>> bool(abs(result.field.sample([[0, 0, 1.5]])[0] - 0.5) < 0.01)
     True
 
     Raises :class:`InputError` for points or constraints that cannot be used and for the signed surface of a shape that

@@ -8,10 +8,6 @@ from .surface import Patch, Surface, from_implicit, from_patches
 TURN = 2 * np.pi
 
 
-def sphere() -> Surface:
-    return from_patches([Patch(lambda uv: _polar(np.ones(len(uv)), uv), (300, 600))])
-
-
 def torus() -> Surface:
     """Radii 1 and 0.4."""
 
