@@ -22,7 +22,7 @@ from .field_quality import FIELD, SLICED, case_fields, densities, density_slices
 from .field_rims import rims
 from .field_verdicts import verdicts
 from .peers import check_open3d
-from .status import page_command
+from .status import page_command, said
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CLOSED, OPEN, BAND = "spot_10k", "cloth_10k", "moebius_5k"
@@ -158,17 +158,17 @@ def measure(folder: Path) -> tuple[dict, dict]:
     check_open3d()
     paths, named = find_cases(folder), find_cases(folder, [CLOSED, OPEN, BAND])
     closed, opened, band = map(load_case, named)
-    along, line_pictures = _said("lines", lines())
-    level_sets = {case.name: _said(f"offsets of {case.name}", offsets(case)) for case in (closed, opened)}
+    along, line_pictures = said("lines", lines())
+    level_sets = {case.name: said(f"offsets of {case.name}", offsets(case)) for case in (closed, opened)}
     numbers = {
         "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
         "lines": along,
         "offsets": [rows for rows, _ in level_sets.values()],
-        "rims": _said("rims", rims([opened, band])),
-        "agreement": _said("diffusion on the grid", list(agreement())),
-        "densities": [_said(f"{row['case']}: {row['points']}", row) for c in (closed, opened) for row in densities(c)],
+        "rims": said("rims", rims([opened, band])),
+        "agreement": said("diffusion on the grid", list(agreement())),
+        "densities": [said(f"{row['case']}: {row['points']}", row) for c in (closed, opened) for row in densities(c)],
         "quality": {sampling: found for sampling in SAMPLINGS if (found := list(_qualities(paths, sampling)))},
-        "cost": [_said(f"{row['points']} points, {row['resolution']} cells", row) for row in costs(named[0])],
+        "cost": [said(f"{row['points']} points, {row['resolution']} cells", row) for row in costs(named[0])],
     }
     pictures = {"lines": line_pictures, "offsets": {name: picture for name, (_, picture) in level_sets.items()}}
     return numbers, pictures | {"densities": _density_cuts(closed)}
@@ -177,7 +177,7 @@ def measure(folder: Path) -> tuple[dict, dict]:
 def _qualities(paths, sampling):
     for path in paths:
         if has_sampling(path, sampling):
-            yield _said(f"{path.stem}, {sampling}", case_fields(path, sampling))
+            yield said(f"{path.stem}, {sampling}", case_fields(path, sampling))
 
 
 def _density_cuts(case):
@@ -186,11 +186,6 @@ def _density_cuts(case):
     place = float(np.median(case.truth.vertices[:, axis]))
     nodes = cut_nodes(reconstruct(case.points, FIELD).field, axis, place)
     return {"nodes": nodes, "axis": axis, "up": UP[case.name], **density_slices(case, nodes.reshape(-1, 3))}
-
-
-def _said(what, result):
-    print(what, flush=True)
-    return result
 
 
 def write_page(numbers: dict, pictures: dict, docs: Path) -> Path:

@@ -32,7 +32,7 @@ from .noise_measure import (
 from .noise_plots import picture, plot_noise
 from .noise_silence import silences
 from .peers import check_open3d
-from .status import DONE, exit_status
+from .status import DONE, exit_status, said
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CASES = ["spot_10k", "cloth_10k", "moebius_5k"]
@@ -164,17 +164,17 @@ def measure(cases: list[Case], others: list[Path]) -> dict:
     check_open3d()
     return {
         "versions": {"Python": platform.python_version(), **dict(_versions())},
-        "hostile": _said("bad input", tried()),
-        "fuzz": _said("fuzz", fuzzed()),
-        "clean": dict(_said("clean cases", list(_clean(others)))),
-        "halves": [_said(f"{case.name}, half noisy", measure_half(case, HALF_NOISE)) for case in cases],
-        "strays": [_said(f"{case.name}, strays {s:.0%}", measure_strays(case, s)) for case in cases for s in STRAYS],
-        "wires": _said("strays among wires", measure_wires()),
+        "hostile": said("bad input", tried()),
+        "fuzz": said("fuzz", fuzzed()),
+        "clean": dict(said("clean cases", list(_clean(others)))),
+        "halves": [said(f"{case.name}, half noisy", measure_half(case, HALF_NOISE)) for case in cases],
+        "strays": [said(f"{case.name}, strays {s:.0%}", measure_strays(case, s)) for case in cases for s in STRAYS],
+        "wires": said("strays among wires", measure_wires()),
         "silences": {
-            name: _said(f"silences, {name}", silences(_sphere(deviation), Settings(surface="both")))
+            name: said(f"silences, {name}", silences(_sphere(deviation), Settings(surface="both")))
             for name, deviation in (("clean", 0.0), ("noisy", SILENCE_NOISE))
         },
-        "noise": [_said(f"{case.name}, noise {p} %", measure_noise(case, p)) for case in cases for p in NOISE],
+        "noise": [said(f"{case.name}, noise {p} %", measure_noise(case, p)) for case in cases for p in NOISE],
         "categories": {case.name: case.meta["category"] for case in cases},
     }
 
@@ -202,11 +202,6 @@ def _sphere(deviation):
     points = rng.normal(size=(SILENCE_POINTS, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     return points + deviation * rng.normal(size=points.shape)
-
-
-def _said(what, result):
-    print(what, flush=True)
-    return result
 
 
 def write_page(measured: dict, docs: Path) -> Path:

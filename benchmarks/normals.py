@@ -29,7 +29,7 @@ from .normal_quality import (
 from .peers import check_open3d
 from .plots import plot_convergence, plot_growth
 from .report import Column, markdown_table
-from .status import page_command
+from .status import page_command, said
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -138,21 +138,16 @@ def measure(folder: Path) -> dict:
     return {
         "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
         "quality": {sampling: list(_qualities(paths, sampling)) for sampling in SAMPLINGS},
-        "ablation": _said("ablation", ablation(load_case(shape))),
-        "convergence": _said("convergence", convergence(load_case(shape, "blue noise"))),
-        "cost": [_said(f"cost at {run['points']} points", run) for run in costs(shape)],
+        "ablation": said("ablation", ablation(load_case(shape))),
+        "convergence": said("convergence", convergence(load_case(shape, "blue noise"))),
+        "cost": [said(f"cost at {run['points']} points", run) for run in costs(shape)],
     }
 
 
 def _qualities(paths, sampling):
     for path in paths:
         if has_sampling(path, sampling):
-            yield _said(f"{path.stem}, {sampling}", case_quality(path, sampling))
-
-
-def _said(what, result):
-    print(what, flush=True)
-    return result
+            yield said(f"{path.stem}, {sampling}", case_quality(path, sampling))
 
 
 def write_page(measured: dict, docs: Path) -> Path:

@@ -23,6 +23,12 @@ def exit_status(command: Callable[[], int]) -> int:
         return CANCELLED
 
 
+def said(what: str, result):
+    """The result, once it is printed what was done."""
+    print(what, flush=True)
+    return result
+
+
 def page_command(arguments: list[str] | None, module: str, description: str, needs: str, write: Callable) -> int:
     """Run `write`, a function of the folder of cases that writes a page and returns its path, on `arguments` (None:
     those of the process), and return the exit status. `needs` says what the folder holds."""

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from .errors import MemoryBudgetError
 from .field.grid import Grid
-from .settings import Settings, options
+from .settings import WITH_SIDES, Settings, options
 
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 
@@ -20,7 +20,6 @@ _SECONDS = {"fixed": 0.3, "sample": 8e-5, "near": 9e-6, "node": 4e-7}  # where t
 
 # The same in a band, at resolutions of 256 and 512: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 110.0, "surface": 1.9e-3, "surface with sides": 3.6e-3}  # MiB
-_WITH_SIDES = "single", "both", "signed"
 _BAND_NEAR = 3.4, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 _BAND_SECONDS = 2e-6  # for a node further out
 _PROBE = 0.006
@@ -52,7 +51,7 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
         area, (width, share) = float(np.sum(cells**2)), _BAND_NEAR
         near = 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells))))
         work += _SECONDS["near"] * near + _BAND_SECONDS * 2.0 * area * settings.band
-        kind = "surface with sides" if settings.surface in _WITH_SIDES else "surface"
+        kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
         memory = _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area
     return Estimate(work * _probe() / _PROBE, max(memory, _diagram(len(spacing))))
 

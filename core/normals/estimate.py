@@ -13,6 +13,7 @@ from ..voronoi.polygons import facet_polygons
 from .adam import minimise
 from .energy import NormalEnergy
 from .energy_torch import torch_value_and_gradient
+from .known import unit_axes
 from .mirrors import Mirrors
 from .pca import pca_normals
 from .reflection import reflection_sweeps
@@ -89,12 +90,7 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
             f"{outside.sum()} constraints are for rows outside the input, row {indices[outside][0]} the first; "
             f"give rows from 0 to {count - 1}"
         )
-    largest = np.abs(axes).max(axis=1)
-    aimless = ~(np.isfinite(largest) & (largest > 0))
-    if aimless.any():
-        raise InputError(f"{aimless.sum()} constraint axes have no direction; give finite non-zero axes")
-    axes = np.ldexp(axes, -np.frexp(largest)[1][:, None])  # exact, and no square over- or underflows
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    axes = unit_axes(axes, "constraint axes")
     position = np.full(count, -1)
     position[source_index] = np.arange(len(source_index))
     rows = position[indices.astype(np.int64)]

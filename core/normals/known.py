@@ -1,4 +1,4 @@
-"""Normals found by an earlier run, taken as they are."""
+"""Normals that are given: found by an earlier run, or by hand."""
 
 import numpy as np
 
@@ -18,8 +18,15 @@ def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarr
             f"and confidence ({count},)"
         )
     axes, confidence = axes[source_index], confidence[source_index]
-    length = np.linalg.norm(axes, axis=1)
-    useless = ~(np.isfinite(length) & (length > 0))
-    if useless.any():
-        raise InputError(f"{int(useless.sum())} known normals have no direction; give finite non-zero axes")
-    return axes / length[:, None], np.clip(confidence, 0.0, 1.0)
+    return unit_axes(axes, "known normals"), np.clip(confidence, 0.0, 1.0)
+
+
+def unit_axes(axes: np.ndarray, what: str) -> np.ndarray:
+    """Axes (k,3) of any length, made unit; `what` they are goes into the :class:`InputError` where some have no
+    direction."""
+    largest = np.abs(axes).max(axis=1)
+    aimless = ~(np.isfinite(largest) & (largest > 0))
+    if aimless.any():
+        raise InputError(f"{aimless.sum()} {what} have no direction; give finite non-zero axes")
+    axes = np.ldexp(axes, -np.frexp(largest)[1][:, None])  # exact, and no square over- or underflows
+    return axes / np.linalg.norm(axes, axis=1, keepdims=True)

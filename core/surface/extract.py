@@ -9,7 +9,7 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
-from ..settings import Settings
+from ..settings import WITH_SIDES, Settings
 from .crossings import find_crossings
 from .double_cover import double_cover
 from .mesh import Mesh
@@ -39,7 +39,7 @@ class Surfaces:
 
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
-    with_sides = settings.surface in ("single", "both", "signed")
+    with_sides = settings.surface in WITH_SIDES
     return max(settings.band, needed_band(local, grid)) if with_sides else settings.band
 
 
@@ -56,7 +56,7 @@ def extract_surfaces(
     meshes, warnings = {}, []
     if kind in ("double", "both"):
         meshes["double"] = double_cover(values, local, grid, settings.offset, progress.part(0.0, 0.3, "double cover"))
-    if kind in ("single", "both", "signed"):
+    if kind in WITH_SIDES:
         crossings = find_crossings(band, local, grid, progress.part(0.3, 0.6, "crossings"))
         sides = find_sides(values, crossings, local, grid)
     if kind in ("single", "both"):

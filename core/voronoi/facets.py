@@ -14,15 +14,14 @@ of i tell what the clipped facet is, and a block needs, besides its own samples,
 """
 
 import math
-import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import Delaunay
 
+from ..parallel import in_order
 from ..progress import Progress
 from .blocks import overlapping_blocks
 
@@ -116,15 +115,10 @@ def by_blocks(
     jitter = np.random.default_rng(seed).uniform(-1, 1, points.shape) * (_JITTER * spacing)[:, None]
     sites, radius = points + jitter, HEEDED * spacing
     blocks, done = overlapping_blocks(sites, radius, progress.part(0.0, 0.1)), 0
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [pool.submit(lambda block: make(_sides(sites, spacing, radius, block)), block) for block in blocks]
-        try:
-            for block, future in zip(blocks, futures, strict=True):
-                yield future.result()
-                done += len(block.own)
-                progress(0.1 + 0.9 * done / len(points))
-        finally:
-            pool.shutdown(cancel_futures=True)
+    for block, made in in_order(lambda block: make(_sides(sites, spacing, radius, block)), blocks):
+        yield made
+        done += len(block.own)
+        progress(0.1 + 0.9 * done / len(points))
 
 
 def _sides(sites, spacing, radius, block):
