@@ -8,12 +8,12 @@ from scipy.ndimage import map_coordinates
 from ..errors import VADError
 from .blocks import Blocks
 from .feet import Feet
+from .grid import CORNERS
 from .steps import NearBand
 
 _WHOLE = 1 << 27  # nodes, the most that a band's values are laid out in the whole box for
 _CHUNK = 1 << 17  # queries
 _WITHIN = 1 - 1e-6  # of the band, up to where values are distances
-_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
 
 class _OnGrid:
@@ -120,8 +120,8 @@ class BandedField(_OnGrid):
         high = np.array(self.shape) - 1
         low = np.minimum(np.floor(cells).astype(np.int64), high - 1)
         share = cells - low
-        weight = np.prod(np.where(_CORNERS, share[:, None], 1 - share[:, None]), axis=2)
-        corner = low[:, None] + _CORNERS
+        weight = np.prod(np.where(CORNERS, share[:, None], 1 - share[:, None]), axis=2)
+        corner = low[:, None] + CORNERS
         values = self.blocks.at(np.ravel_multi_index(tuple(np.moveaxis(corner, 2, 0)), self.shape)).astype(np.float64)
         found = np.einsum("mc,mc->m", weight, values)
         out = np.flatnonzero((np.abs(values) >= _WITHIN * self.band).any(axis=1))

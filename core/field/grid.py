@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T  # of a cell, as steps from its lowest node
 PADDING = 0.125  # of the object's longest side, on every side
 
 

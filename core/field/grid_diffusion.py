@@ -13,13 +13,11 @@ from ..errors import SettingsError
 from ..linalg import outer, principal_axes
 from ..progress import Progress
 from .diffusion import DIFFUSION_LENGTH
-from .grid import Grid
+from .grid import CORNERS, Grid
 
 LEAST_LENGTH = 0.5  # cells of sqrt(t)
 FARTHEST = 33.0  # sqrt(t); exp(-33) is about 20 times the rounding of float64
 _CHUNK = 1 << 16  # nodes
-
-_CORNERS = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(8, 3)
 
 
 def check_held(spacing: np.ndarray, grid: Grid, farthest: float) -> None:
@@ -84,10 +82,10 @@ def _corners(points, grid):
     cells = (points - grid.origin) / grid.spacing
     base = np.floor(cells).astype(np.int64)
     inside = (cells - base)[:, None]
-    along = np.where(_CORNERS == 1, inside, 1 - inside)
-    sign = np.where(_CORNERS == 1, 1.0, -1.0)
+    along = np.where(CORNERS == 1, inside, 1 - inside)
+    sign = np.where(CORNERS == 1, 1.0, -1.0)
     slopes = [sign[:, a] * along[..., (a + 1) % 3] * along[..., (a + 2) % 3] for a in range(3)]
-    node = np.ravel_multi_index(np.moveaxis(base[:, None] + _CORNERS, -1, 0), grid.shape)
+    node = np.ravel_multi_index(np.moveaxis(base[:, None] + CORNERS, -1, 0), grid.shape)
     return node, along.prod(axis=-1), np.stack(slopes, axis=-1)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..progress import Progress
 from .blocks import SIDE, Blocks, blocks_of, table_shape
 from .feet import Feet, settled_feet
-from .grid import Grid
+from .grid import CORNERS, Grid
 from .integration import BAND, sample_reach
 from .local_surface import LocalSurface, Projection
 from .steps import NearBand
@@ -21,7 +21,6 @@ _MARGIN = 1.0  # cells, by which a projection may err in leaving a group out
 _ERROR = 0.05  # the same around sparse samples, relative to how far their patches reach
 _SPARSE = 4.0  # sides of a group; patches that reach further are sparse
 _PIECE = 1 << 17  # nodes or groups at a time
-_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 
 
 def banded_field(surface: LocalSurface, grid: Grid, width: float, progress=None) -> tuple[Blocks, NearBand, Feet]:
@@ -57,7 +56,7 @@ def _groups(surface, grid, width, progress):
         part, far = corner[rows], reach[rows]
         for side in (SIDE, 4, 2):
             if side < SIDE:
-                part = (part[:, None] + side * _CORNERS.astype(np.int32)).reshape(-1, 3)
+                part = (part[:, None] + side * CORNERS.astype(np.int32)).reshape(-1, 3)
                 far = np.repeat(far, 8)
             middle = _middles(grid, part, side)
             distance, sample = surface.tree.query(middle, workers=-1)
@@ -159,6 +158,6 @@ def _middles(grid, corner, side):
 
 def _members(grid, corner):
     """Nodes of the grid in groups of 2^3 with lowest nodes (g,3): flat indices, and which group each is in."""
-    at = corner[:, None].astype(np.int64) + _CORNERS
+    at = corner[:, None].astype(np.int64) + CORNERS
     fits = (at < np.array(grid.shape)).all(axis=2)
     return np.ravel_multi_index(tuple(at[fits].T), grid.shape), np.repeat(np.arange(len(corner)), fits.sum(axis=1))

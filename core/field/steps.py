@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
+from .grid import CORNERS
+
 _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point at each other
 
 
@@ -40,7 +41,7 @@ class NearBand:
         """
         lowest = np.clip(np.floor(cells).astype(np.int64), 0, np.array(shape) - 2)
         strides = np.array([shape[1] * shape[2], shape[2], 1])
-        row = self.rows((lowest @ strides)[:, None] + _CORNERS @ strides)
+        row = self.rows((lowest @ strides)[:, None] + CORNERS @ strides)
         chosen = np.flatnonzero((row >= 0).all(axis=1))
         corner = self.step[row[chosen]].reshape(-1, 2, 2, 2, 3)
         apart = [np.diff(corner[..., axis], axis=1 + axis).reshape(len(chosen), 4) for axis in range(3)]

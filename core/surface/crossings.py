@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..field.grid import Grid
+from ..field.grid import CORNERS, Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
@@ -27,9 +27,8 @@ from .mending import mend
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
 
-_CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
-_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a] - _CORNERS[b]).sum() == 1])
-_EDGE_AXIS = np.abs(_CORNERS[_EDGES[:, 1]] - _CORNERS[_EDGES[:, 0]]).argmax(axis=1)
+_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
+_EDGE_AXIS = np.abs(CORNERS[_EDGES[:, 1]] - CORNERS[_EDGES[:, 0]]).argmax(axis=1)
 
 
 @dataclass(frozen=True)
@@ -113,11 +112,11 @@ def _sides(band, grid):
     the cell's normal, (c,8); the sign is the cell's own."""
     at = np.stack(np.unravel_index(band.node, grid.shape), axis=1)
     lowest = band.node[(at < np.array(grid.shape) - 1).all(axis=1)]
-    corner = np.stack([band.rows(lowest + step) for step in _CORNERS @ node_strides(grid)], axis=1)
+    corner = np.stack([band.rows(lowest + step) for step in CORNERS @ node_strides(grid)], axis=1)
     whole = (corner >= 0).all(axis=1)
     lowest, corner = lowest[whole], corner[whole]
     step = band.step[corner] + _HAIR * grid.spacing
-    slope = np.einsum("cki,kj->cij", step, _CORNERS - 0.5)
+    slope = np.einsum("cki,kj->cij", step, CORNERS - 0.5)
     slope = slope + slope.transpose(0, 2, 1)
     normal, _ = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     return lowest, np.einsum("cki,ci->ck", step, normal)
@@ -127,7 +126,7 @@ def _vote(cells, side, grid):
     """Edges of the cells, as lower node * 3 + axis (e,), votes that they are crossed, positive if so, (e,), and the
     likely places (e,3)."""
     a, b = side[:, _EDGES[:, 0]], side[:, _EDGES[:, 1]]
-    key = 3 * (cells[:, None] + _CORNERS[_EDGES[:, 0]] @ node_strides(grid)) + _EDGE_AXIS
+    key = 3 * (cells[:, None] + CORNERS[_EDGES[:, 0]] @ node_strides(grid)) + _EDGE_AXIS
     opposite = (a >= 0) != (b >= 0)
     certain = np.minimum(np.abs(a), np.abs(b)) + 1e-9 * grid.spacing
     share = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
