@@ -41,7 +41,7 @@ exit status:
   0    done
   2    the scan, an option or the output folder cannot be used: one line on stderr says what and how to help it
   3    the run would need more memory than it may have: the line names a resolution that fits
-  130  cancelled by Ctrl-C; no file is left half-written
+  130  cancelled by Ctrl-C or a request to end (SIGTERM); no file is left half-written
 
 With --json, stdout holds one JSON document and nothing else: the report, or {{"error": "..."}} beside the line on
 stderr.
@@ -66,6 +66,7 @@ and confidence (of the nearest sample); where SCAN is a .ply, meshes and points 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) and return the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         given = _parser().parse_args(arguments)
         given.run(given)
@@ -78,6 +79,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(error, BAD_INPUT, arguments)
     except KeyboardInterrupt:
         return _fail("cancelled", CANCELLED, arguments)
+    finally:
+        signal.signal(signal.SIGTERM, previous)
 
 
 def _fail(error, status, arguments):
@@ -170,15 +173,15 @@ def _reconstruct(given):
 
 @contextmanager
 def _progress():
-    """A progress callback that draws a bar where stderr is a terminal, and cancels after the first Ctrl-C.
+    """A progress callback that draws a bar where stderr is a terminal, and cancels after the first Ctrl-C or SIGTERM.
 
-    The second Ctrl-C stops at once, as it would any Python program.
+    The second stops at once, as it would any Python program.
     """
     pressed = []
 
     def interrupt(signum, frame):
         pressed.append(signum)
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signum, signal.default_int_handler)
 
     def report(fraction, text):
         if not bar.disable:
@@ -186,12 +189,13 @@ def _progress():
             bar.update(fraction - bar.n)
         return not pressed
 
-    previous = signal.signal(signal.SIGINT, interrupt)
+    previous = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         with tqdm(total=1.0, bar_format=_BAR, miniters=0, disable=None, leave=False) as bar:
             yield report
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
 
 
 def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):

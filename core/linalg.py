@@ -8,12 +8,14 @@ import numpy as np
 _DISTINCT = 1e-5  # below this the two largest eigenvalues are too close for the closed form
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-_ROWS, _COLUMNS = np.array(COMPONENTS).T
 
 
 def outer(vectors: np.ndarray) -> np.ndarray:
     """v v^T, (...,3) -> (...,6)."""
-    return vectors[..., _ROWS] * vectors[..., _COLUMNS]
+    products = np.empty((*vectors.shape[:-1], len(COMPONENTS)), vectors.dtype)
+    for c, (i, j) in enumerate(COMPONENTS):
+        np.multiply(vectors[..., i], vectors[..., j], out=products[..., c])
+    return products
 
 
 def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,8 +17,11 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
     cores = os.cpu_count() or 1
     chunks = iter(chunks)
     with ThreadPoolExecutor(cores) as pool:
-        waiting = [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, cores * _AHEAD)]
-        while waiting:
-            chunk, result = waiting.pop(0)
-            yield chunk, result.result()
-            waiting += [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, 1)]
+        try:
+            waiting = [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, cores * _AHEAD)]
+            while waiting:
+                chunk, result = waiting.pop(0)
+                yield chunk, result.result()
+                waiting += [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, 1)]
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import asdict
+from functools import partial
 
 import numpy as np
 
@@ -17,11 +18,12 @@ from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
 from .points import local_spacing, prepare_samples
-from .progress import Progress
+from .progress import Progress, watched
 from .reconstruction import Reconstruction
 from .settings import Settings
-from .surface.extract import band_for, extract_surfaces
-from .surface.quality import triangle_quality
+from .surface.extract import Surfaces, band_for, extract_surfaces
+from .surface.pieces import piece_count
+from .surface.quality import quad_quality, triangle_quality
 
 
 def reconstruct(
@@ -49,17 +51,20 @@ def reconstruct(
     is not closed, :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled`
     where `progress` says so.
     """
-    progress, stages = Progress.of(progress), _Stages()
+    return watched(partial(_reconstruct, points, settings, constraints, normals), progress)
 
+
+def _reconstruct(points, settings, constraints, normals, progress):
+    stages = _Stages()
     with stages("points"):
         samples, given = prepare_samples(points), len(np.asarray(points))
 
     with stages("cleaning"):
         cleaning = {}
         if normals is None:
-            samples, cleaning = clean(samples, settings, progress.part(0.0, 0.1, "cleaning"))
+            samples, cleaning = clean(samples, settings, progress.part(0.0, 0.09, "cleaning"))
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
-        spacing = local_spacing(samples.points)
+        spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
         grid = fit_grid(samples.points, settings.resolution)
         estimate = estimate_cost(spacing, grid, settings)
         check_budget(estimate, len(spacing), grid, settings)
@@ -83,7 +88,7 @@ def reconstruct(
             values, near, feet = banded_field(local, grid, band_for(settings, local, grid), part)
 
     with stages("surface"):
-        part = progress.part(0.8, 1.0)
+        part = progress.part(0.8, 0.99)
         surfaces = extract_surfaces(values, near, local, grid, settings, samples.to_input_units, part)
 
     report = {
@@ -97,15 +102,7 @@ def reconstruct(
         },
         "cleaning": cleaning,
         "normals": solved,
-        "meshes": {
-            kind: {
-                "vertices": len(mesh.vertices),
-                "faces": len(mesh.faces),
-                "borders": mesh.border_loops(),
-                **triangle_quality(mesh),
-            }
-            for kind, mesh in surfaces.meshes.items()
-        },
+        "meshes": mesh_facts(surfaces, progress.part(0.99, 1.0)),
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
         "spacing": float(np.median(spacing)) * samples.scale,
         "seconds": stages.seconds,
@@ -124,6 +121,23 @@ def reconstruct(
         sheet=surfaces.meshes.get("single"),
         report=report,
     )
+
+
+def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
+    """What the report tells of each mesh, by kind."""
+    look = Progress.of(progress)
+    facts = {}
+    for kind, mesh in surfaces.meshes.items():
+        facts[kind] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
+        facts[kind] |= {"pieces_dropped": surfaces.dropped[kind]}
+        counted = {"borders": mesh.border_loops, "pieces": partial(piece_count, mesh)}
+        for name, count in counted.items():
+            look(0.0)
+            facts[kind][name] = count()
+        for quality in (triangle_quality, quad_quality):
+            look(0.0)
+            facts[kind] |= quality(mesh)
+    return facts
 
 
 def _field(surfaces, near, feet, grid, samples, band):

@@ -12,7 +12,7 @@ MINIMUM_SAMPLES = 4
 SPACING_NEIGHBOURS = 6
 _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
-_CHUNK = 65536  # samples
+_CHUNK = 16384  # samples
 _FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
 

@@ -1,10 +1,17 @@
 """Progress reports that double as the place where a run can be cancelled."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+from typing import Any, NamedTuple
 
 from .errors import Cancelled
 
 ProgressCallback = Callable[[float, str], bool | None]
+
+_SILENCE = 0.2  # seconds, after which a callback hears the last report again
+_FAREWELL = 0.5  # seconds that a cancelled run is given to look up and end
 
 
 class Progress:
@@ -59,3 +66,48 @@ class Progress:
             return
         if self._callback(self._start + fraction * (self._stop - self._start), self._text) is False:
             raise Cancelled(f"cancelled during '{self._text}'; nothing was written")
+
+
+class _Outcome(NamedTuple):
+    result: Any
+    error: BaseException | None
+
+
+def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallback | None) -> Any:
+    """What `work` returns or raises; it is given a :class:`Progress` to report to.
+
+    A callback hears of the progress in the caller's thread while the work is done in another: at every report, and
+    the last one again where the work is silent for long. So a cancel is heeded at once, even while a library sorts
+    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. With a
+    `Progress` or nothing to report to, all is done in the caller's thread.
+    """
+    if progress is None or isinstance(progress, Progress):
+        return work(Progress.of(progress))
+    reports, cancelled = SimpleQueue(), Event()
+
+    def look(*report):
+        reports.put(report)
+        return not cancelled.is_set()
+
+    def run():
+        try:
+            reports.put(_Outcome(work(Progress(look)), None))
+        except BaseException as error:  # noqa: BLE001  raised again in the caller's thread
+            reports.put(_Outcome(None, error))
+
+    thread, last = Thread(target=run, daemon=True), None
+    thread.start()
+    try:
+        while True:
+            with suppress(Empty):
+                last = reports.get(timeout=_SILENCE)
+            if isinstance(last, _Outcome):
+                break
+            if last is not None:
+                Progress(progress, text=last[1])(last[0])
+    finally:
+        cancelled.set()
+        thread.join(_FAREWELL)
+    if last.error is not None:
+        raise last.error
+    return last.result

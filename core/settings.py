@@ -63,6 +63,12 @@ class Settings:
         "and normals only)",
         choices=("double", "single", "both", "signed", "none"),
     )
+    faces: str = _option(
+        "triangles",
+        "What meshes are made of: triangles, or quads along the grid's axes, for subdivision and sculpting; a single "
+        "layer keeps a few triangles where it ends or sheets meet",
+        choices=("triangles", "quads"),
+    )
     pieces: float = _option(
         0.0,
         "Leave pieces out of a mesh that have less than this share of its largest piece's area, floating scraps for "
@@ -89,8 +95,15 @@ class Settings:
     )
     backend: str = _option(
         "auto",
-        "What differentiates the energy of that solver: torch, NumPy, or torch where it is installed",
+        "What differentiates the energy where the solver is energy: torch, NumPy, or torch where it is installed. "
+        "Nothing else in a run uses torch",
         choices=("numpy", "torch", "auto"),
+    )
+    device: str = _option(
+        "auto",
+        "Where torch does that: on the processor, on an Nvidia GPU (cuda), or on the GPU where torch sees one. Nothing "
+        "else in a run uses a GPU",
+        choices=("cpu", "cuda", "auto"),
     )
     outliers: bool = _option(
         True,

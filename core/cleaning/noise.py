@@ -20,6 +20,7 @@ _USABLE = 6.0  # and averages it, rather than following it, once its radius is t
 _GAUSS = 1.4826  # standard deviations in a median absolute error
 _STRAY = 4.5  # errors count as at most this many median ones
 _FREEDOM = 2.0  # a robust fit follows its samples more than its leverage says
+_CHUNK, _SAMPLES = 1000, 32768  # anchors, samples
 _UNEVEN = 2.0  # a region's noise counts as at most this many times the median: two close sheets look like noise
 
 _SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
@@ -72,7 +73,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     if not whole and suspect.sum() < least:
         return clean
 
-    _, confidence, _ = estimate_normals(points, spacing, progress=progress.part(0.1, 1.0))
+    _, confidence, _ = estimate_normals(points, spacing, progress=progress.part(0.1, 0.9))
     if whole and np.median(confidence) < _AGREED:
         return ~clean
     agreement = np.median(confidence[anchors][region], axis=1)
@@ -82,7 +83,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         return clean
     suspect &= core[region].any(axis=1)
     noisy = suspect[region[:, :_SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
-    return noisy[KDTree(points[anchors]).query(points, workers=-1)[1]]
+    return noisy[_nearest(points, points[anchors], progress.part(0.9, 1.0))]
 
 
 def _rough(relative, growth):
@@ -105,11 +106,13 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     progress = Progress.of(progress)
     anchors, region = _anchors(points, seed)
     ladder = np.array([k for k in LADDER if k < len(points)])
-    radius = KDTree(points).query(points[anchors], k=list(ladder + 1), workers=-1)[0].T
+    tree, radius = KDTree(points), np.empty((len(ladder), len(anchors)))
+    for part in progress.part(0.0, 0.1).chunks(len(anchors), _CHUNK):
+        radius[:, part] = tree.query(points[anchors[part]], k=list(ladder + 1), workers=-1)[0].T
 
     missed, squared, leverage = np.empty((3, len(ladder), len(anchors)))
     for i, k in enumerate(ladder):
-        fit = fit_quadrics(points, anchors, int(k), progress.part(i / len(ladder), (i + 1) / len(ladder)))
+        fit = fit_quadrics(points, anchors, int(k), progress.part(*(0.1 + 0.8 * np.array([i, i + 1]) / len(ladder))))
         missed[i] = np.sqrt(_regional_square(fit.left_out(), region))
         squared[i] = _regional_square(fit.height, region)
         leverage[i] = np.median(fit.leverage[region], axis=1)
@@ -122,7 +125,7 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     risk[np.arange(len(ladder))[:, None] < _first(radius >= _USABLE * level)] = np.inf
     neighbours = np.exp(np.log(ladder)[risk.argmin(axis=0)][region[:, :_SMOOTHING]].mean(axis=1))
 
-    nearest = KDTree(points[anchors]).query(points, workers=-1)[1]
+    nearest = _nearest(points, points[anchors], progress.part(0.9, 1.0))
     return Noise(level[nearest], neighbours[nearest])
 
 
@@ -131,6 +134,14 @@ def _anchors(points, seed):
     count = min(len(points), _ANCHORS)
     anchors = np.sort(np.random.default_rng(seed).choice(len(points), count, replace=False))
     return anchors, KDTree(points[anchors]).query(points[anchors], k=min(_REGION, count), workers=-1)[1]
+
+
+def _nearest(points, anchors, progress):
+    """Which of the anchors (m,3) is nearest to each of the samples (n,3), (n,) int."""
+    tree, nearest = KDTree(anchors), np.empty(len(points), np.int64)
+    for part in progress.chunks(len(points), _SAMPLES):
+        nearest[part] = tree.query(points[part], workers=-1)[1]
+    return nearest
 
 
 def _first(holds):

@@ -22,7 +22,7 @@ _LONELY = 2.0  # spacing over that of the neighbours
 _ALONE = 5.0  # so lonely that the plane no longer matters
 _OFF = 2.0  # distance from the neighbours' plane over their spacing
 _THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a cloud .3
-_CHUNK = 16384  # samples
+_CHUNK = 8192  # samples
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
 _WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
 _COMPANY = 40  # sparse samples that vote whether they are strays
@@ -55,9 +55,10 @@ def find_outliers(points, progress=None) -> np.ndarray:
         around = _Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > _DIRTY * len(points)
         found = around.beside(_STRICT if dirty else 1.0) | around.scattered(part.part(0.6, 0.7))
+        part(0.7)
         found |= around.detached()
         if dirty:
-            found |= around.hovering(part.part(0.7, 1.0))
+            found |= around.hovering(part.part(0.8, 1.0))
         stray[kept[found]] = True
         if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
             break

@@ -15,7 +15,7 @@ _ROUNDS = 2
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
-_CHUNK = 400_000  # neighbours
+_CHUNK = 100_000  # neighbours
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ def distance_field(
     in which it is known with its direction. Outside the band by `integration`: "transport" or "poisson", the latter
     with directions by `diffusion`: "kernel" or "grid"."""
     progress = Progress.of(progress)
-    node, bound = _near_samples(surface, grid)
+    node, bound = _near_samples(surface, grid, progress.part(0.0, 0.05))
     near = surface.project(grid.positions(node), progress.part(0.05, 0.6))
     inside = near.distance <= BAND * grid.spacing
     node, near = node[inside], near[inside]
@@ -55,7 +55,7 @@ def sample_reach(surface: LocalSurface) -> np.ndarray:
     return np.maximum(DISC * surface.spacing, surface.rims.reach)
 
 
-def _near_samples(surface, grid):
+def _near_samples(surface, grid, progress):
     """Flat index of every node that may lie within the band of the patches, and the distance of every node to a sample
     that is nearest or nearly so, float32 of the grid's shape: more than the distance to the surface can be."""
     home = grid.nearest_nodes(surface.points)
@@ -63,13 +63,15 @@ def _near_samples(surface, grid):
     held.flat[home] = np.arange(len(home), dtype=np.int32)
     reach = np.zeros(grid.shape, np.float32)
     np.maximum.at(reach.reshape(-1), home, (sample_reach(surface) / grid.spacing).astype(np.float32))
+    progress(0.0)
     distance, nearest = distance_transform_edt(held < 0, return_indices=True)
+    progress(0.8)
     nearest = np.ravel_multi_index(tuple(nearest), grid.shape)
     near = np.flatnonzero(distance <= BAND + 0.5 * np.sqrt(3) + reach.flat[nearest])
     sample = held.flat[nearest]
     points = np.ascontiguousarray(surface.points.T, np.float32)
     bound = np.empty(grid.shape, np.float32)
-    for slab in _slabs(grid):
+    for slab in progress.part(0.8, 1.0).each(_slabs(grid)):
         row = sample[slab]
         bound[slab] = np.sqrt(sum((x - p[row]) ** 2 for x, p in zip(_positions(grid, slab), points, strict=True)))
     return near, bound
@@ -78,7 +80,9 @@ def _near_samples(surface, grid):
 def _transport(grid, node, feet, progress):
     row = np.full(grid.shape, -1, np.int32)
     row.flat[node] = np.arange(len(node), dtype=np.int32)
+    progress(0.0)
     nearest = distance_transform_edt(row < 0, return_distances=False, return_indices=True)
+    progress(0.0)
     row = row[tuple(nearest)]
     del nearest
     values = np.empty(grid.shape, np.float32)

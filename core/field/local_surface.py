@@ -13,7 +13,7 @@ from .curvature import bending, tangent_frames
 from .projection import Projection, project
 
 NEIGHBOURS = 16  # of a sample, that its patch is fitted to
-_CHUNK = 32768  # samples
+_CHUNK = 16384  # samples
 
 
 @dataclass(frozen=True)

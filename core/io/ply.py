@@ -14,14 +14,13 @@ from .atomic import atomic_path
 
 
 def write_mesh(path: str | os.PathLike, mesh: Mesh, attributes: dict[str, np.ndarray] | None = None) -> None:
-    """Write `mesh` as `path`: vertices double x, y, z in input units; faces as lists of three int32 indices.
+    """Write `mesh` as `path`: vertices double x, y, z in input units; faces as lists of int32 indices, four of each
+    quad, then three of each triangle that is no half of one.
 
     attributes : further properties of the vertices by name, (v,) each, written in their own type
     """
-    faces = np.empty(len(mesh.faces), [("vertex_indices", "<i4", (3,))])
-    faces["vertex_indices"] = mesh.faces
     vertices = _records(_triple("xyz", mesh.vertices) | (attributes or {}))
-    _write(path, PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face"))
+    _write(path, PlyElement.describe(vertices, "vertex"), _faces([mesh.quads, mesh.triangles]))
 
 
 def write_points(
@@ -34,6 +33,19 @@ def write_points(
     axes = _triple(("nx", "ny", "nz"), np.asarray(normals, np.float32))
     records = _records(_triple("xyz", points) | axes | (attributes or {}))
     _write(path, PlyElement.describe(records, "vertex"))
+
+
+def _faces(kinds):
+    """The element of faces out of quads (q,4) and triangles (t,3)."""
+    kinds = [kind for kind in kinds if len(kind)] or kinds[-1:]
+    if len(kinds) == 1:
+        (kind,) = kinds
+        faces = np.empty(len(kind), [("vertex_indices", "<i4", kind.shape[1:])])
+        faces["vertex_indices"] = kind
+        return PlyElement.describe(faces, "face")
+    faces = np.empty(sum(map(len, kinds)), [("vertex_indices", object)])
+    faces["vertex_indices"][:] = [face for kind in kinds for face in kind]
+    return PlyElement.describe(faces, "face", val_types={"vertex_indices": "i4"})
 
 
 def _triple(names, block):

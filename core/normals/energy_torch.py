@@ -1,24 +1,35 @@
 """The normal energy differentiated by torch, which is imported on the first call and never before."""
 
+import sys
+
 import numpy as np
 
 from ..errors import MissingDependency
 from .energy import NormalEnergy
 
 
-def torch_value_and_gradient(energy: NormalEnergy):
-    """What `energy.value_and_gradient` does, by autograd, on the GPU where torch sees one.
+def torch_device(wanted: str) -> str:
+    """The device that torch is to use, "cpu" or "cuda", where `wanted` is one of these or "auto".
+
+    Raises :class:`MissingDependency` where torch is not installed, or sees no GPU and one is wanted.
+    """
+    torch = _torch()
+    if wanted == "cuda" and not torch.cuda.is_available():
+        raise MissingDependency(
+            f"device is 'cuda' and torch {torch.__version__} sees no Nvidia GPU; install its driver and a torch made "
+            "for CUDA, or use device 'cpu'"
+        )
+    if wanted == "auto":
+        return "cuda" if torch.cuda.is_available() else "cpu"
+    return wanted
+
+
+def torch_value_and_gradient(energy: NormalEnergy, device: str = "cpu"):
+    """What `energy.value_and_gradient` does, by autograd, on `device`, "cpu" or "cuda".
 
     Raises :class:`MissingDependency` where torch is not installed.
     """
-    try:
-        import torch
-    except ImportError as error:
-        raise MissingDependency(
-            "backend is 'torch', which is not installed; pip install torch, or use numpy"
-        ) from error
-
-    device = "cuda" if torch.cuda.is_available() else "cpu"
+    torch = _torch()
     site, other, from_site, from_other, weight, owner, direction, scales = (
         torch.as_tensor(array, device=device)
         for array in (
@@ -40,3 +51,13 @@ def torch_value_and_gradient(energy: NormalEnergy):
         return value.item(), axes.grad.cpu().numpy()
 
     return evaluate
+
+
+def _torch():
+    try:
+        import torch
+    except ImportError as error:
+        raise MissingDependency(
+            f'backend is "torch", which is not installed; run "{sys.executable}" -m pip install torch, or use "numpy"'
+        ) from error
+    return torch

@@ -4,7 +4,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, SettingsError
 from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples
@@ -12,7 +12,7 @@ from ..voronoi.facets import voronoi_facets
 from ..voronoi.polygons import facet_polygons
 from .adam import minimise
 from .energy import NormalEnergy
-from .energy_torch import torch_value_and_gradient
+from .energy_torch import torch_device, torch_value_and_gradient
 from .known import unit_axes
 from .mirrors import Mirrors
 from .pca import pca_normals
@@ -30,7 +30,8 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     (`random_axes`), from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and
     .975 instead of .970, .989 and .9999.
 
-    Raises :class:`MissingDependency` where torch is asked for and not installed.
+    Raises :class:`MissingDependency` where torch or a GPU is asked for and missing, :class:`SettingsError` where NumPy
+    is asked for on a GPU.
     """
     progress = Progress.of(progress)
     if settings.solver == "pca":
@@ -48,22 +49,35 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
 
 
 def _least_energy(points, spacing, settings, constraints, progress):
+    backend, device = _backend(settings)
     polygons = facet_polygons(points, spacing, settings.seed, progress.part(0.0, 0.1))
     samples = bisector_samples(polygons, spacing, seed=settings.seed)
     progress(0.2)
     energy, mirrors = NormalEnergy(points, spacing, samples), Mirrors(points, spacing, samples.facets)
-    backend = settings.backend
-    if backend == "auto":
-        backend = "torch" if find_spec("torch") else "numpy"
-    evaluate = torch_value_and_gradient(energy) if backend == "torch" else energy.value_and_gradient
+    evaluate = torch_value_and_gradient(energy, device) if backend == "torch" else energy.value_and_gradient
     normals, history = minimise(evaluate, mirrors.plane_fit(), constraints, progress.part(0.2, 1.0))
     report = {
         "facets": len(samples.facets.pairs),
         "bisector_samples": len(samples.facet),
         "backend": backend,
+        "device": device,
         "energy": history,
     }
     return normals, mirrors.confidence(normals), report
+
+
+def _backend(settings):
+    """What differentiates the energy, and where: "numpy" or "torch", and "cpu" or "cuda"."""
+    backend = settings.backend
+    if backend == "auto":
+        backend = "torch" if settings.device == "cuda" or find_spec("torch") else "numpy"
+    if backend == "torch":
+        return backend, torch_device(settings.device)
+    if settings.device == "cuda":
+        raise SettingsError(
+            "device is 'cuda' and backend 'numpy', which uses no GPU; use backend 'torch', or device 'cpu'"
+        )
+    return backend, "cpu"
 
 
 def checked_constraints(constraints, source_index: np.ndarray, count: int):

@@ -4,6 +4,7 @@ import numpy as np
 from scipy import sparse
 
 from ..linalg import outer, principal_axes
+from ..progress import Progress
 from ..voronoi.facets import Facets
 
 _CLOSEST = 0.25  # local spacings
@@ -22,7 +23,9 @@ class Mirrors:
     now .0005.
     """
 
-    def __init__(self, points: np.ndarray, spacing: np.ndarray, facets: Facets):
+    def __init__(self, points: np.ndarray, spacing: np.ndarray, facets: Facets, progress=None):
+        progress = Progress.of(progress)
+        progress(0.0)
         self.site, self.other = np.concatenate([facets.pairs, facets.pairs[:, ::-1]]).T
         step = points[self.other] - points[self.site]
         length = np.linalg.norm(step, axis=1)
@@ -31,6 +34,7 @@ class Mirrors:
         total = np.bincount(self.site, weights=weight, minlength=len(points))
         weight /= np.where(total > 0, total, 1.0)[self.site]
         self.direction = step / length[:, None]
+        progress(0.5)
         self.gather = sparse.csr_matrix((weight, (self.site, np.arange(len(weight)))), shape=(len(points), len(weight)))
         self.alignment = self.gather @ outer(self.direction)
 

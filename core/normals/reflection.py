@@ -49,12 +49,12 @@ def reflection_sweeps(points, spacing, facets: Facets, constraints=None, start=N
     the squared cosine between an axis and the mirror images of its neighbours; and the number of sweeps.
     """
     progress = Progress.of(progress)
-    mirrors = Mirrors(points, spacing, facets)
+    mirrors = Mirrors(points, spacing, facets, progress.part(0.0, 0.1))
     normals = mirrors.plane_fit() if start is None else start.copy()
     fixed, axes = ([], np.empty((0, 3))) if constraints is None else constraints
     normals[fixed] = axes
     for sweep in range(1, MAX_SWEEPS + 1):
-        progress(sweep / MAX_SWEEPS)
+        progress(0.1 + 0.9 * sweep / MAX_SWEEPS)
         turned = sweep_once(mirrors, normals, sweep)
         turned[fixed] = axes
         cosine = np.abs(np.einsum("ni,ni->n", turned, normals))

@@ -25,6 +25,7 @@ from .meeting_edges import meeting_edges
 from .mending import mend
 
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
+_SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
@@ -62,7 +63,7 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.5))
     cells, side = _sides(band, grid)
     edge, vote, place = _vote(cells, side, grid)
-    alone = ~np.isin(edge, meet.zone)
+    alone = ~np.isin(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
     edge, vote, place = edge[alone], vote[alone], place[alone]
     found = surface.project(place, progress.part(0.5, 1.0))
     on = found.distance <= _COVERED * grid.spacing
@@ -85,6 +86,18 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
         cells,
         np.concatenate([normal[whole][crossed], meet.normal[twice]]),
     )
+
+
+def _may_be_covered(band, edge, place, grid):
+    """Whether the distances at the ends of edges (e,), at most as different as the places are far apart, let these
+    places (e,3) on them be covered, (e,) bool; the others need no projection."""
+    node, axis = np.divmod(edge, 3)
+    along = (place - grid.positions(node)).sum(axis=1)
+    below, above = (
+        np.linalg.norm(band.step[band.rows(end)], axis=1) for end in (node, node + node_strides(grid)[axis])
+    )
+    least = np.maximum(below - along, above - (grid.spacing - along))
+    return least <= (_COVERED + _SLACK) * grid.spacing
 
 
 def _once(meet):

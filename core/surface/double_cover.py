@@ -9,7 +9,7 @@ from ..progress import Progress
 from .isosurface import isosurface
 from .mesh import Mesh
 from .pieces import pieces_with_samples
-from .triangles import triangles
+from .triangles import mesh_of
 
 _ROUNDS = 2
 CLAMP = 2.0  # cells beyond the offset; farther nodes do not matter and are made background
@@ -26,15 +26,21 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
     to its foot point on the local surface, twice, instead of descending a mesh energy. The mesh is closed and each of
     its edges has two faces, wound so that normals point away from the surface on either side; an open sheet gives one
     piece, a closed one an outer and an inner piece. Flattened against the surface, rims have thin triangles.
+
+    Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
+    Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
     """
     progress = Progress.of(progress)
     level = np.float32(offset * grid.spacing)
     clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)
+    progress(0.0)
     cells, faces = isosurface(clamped, level)
-    vertices = grid.origin + grid.spacing * cells
+    vertices, part = grid.origin + grid.spacing * cells, progress.part(0.0, 0.8)
     for turn in range(_ROUNDS):
-        step = surface.project(vertices, progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)).step
+        step = surface.project(vertices, part.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)).step
         length = np.linalg.norm(step, axis=1, keepdims=True)
         vertices = vertices - step * np.minimum(1.0, _LONGEST_STEP * level / np.maximum(length, np.finfo(float).tiny))
-    mesh = Mesh(vertices, triangles(vertices, faces).astype(np.int32))
+    progress(0.8)
+    mesh = mesh_of(vertices, faces)
+    progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)

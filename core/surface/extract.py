@@ -12,6 +12,7 @@ from ..progress import Progress
 from ..settings import WITH_SIDES, Settings
 from .crossings import find_crossings
 from .double_cover import double_cover
+from .isosurface import need_quads
 from .mesh import Mesh
 from .pieces import without_small_pieces
 from .sides import find_sides, needed_band
@@ -25,16 +26,19 @@ class Surfaces:
 
     values   : (nx,ny,nz) float32 or Blocks, the distances, signed where a signed surface was asked for
     meshes   : by kind: "double", "signed", "single"
+    dropped  : by kind, number of pieces left out for the setting `pieces`
     warnings : where a mesh is less than was asked for, one line each
     """
 
     values: np.ndarray | Blocks
     meshes: dict[str, Mesh] = field(default_factory=dict)
+    dropped: dict[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     def placed(self, place) -> "Surfaces":
         """The same with vertices taken to the user's units by the function `place`."""
-        return replace(self, meshes={kind: Mesh(place(m.vertices), m.faces) for kind, m in self.meshes.items()})
+        placed = {kind: replace(mesh, vertices=place(mesh.vertices)) for kind, mesh in self.meshes.items()}
+        return replace(self, meshes=placed)
 
 
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
@@ -50,15 +54,18 @@ def extract_surfaces(
     :func:`band_for` says, and the nodes near the surface.
 
     place : function that takes positions (m,3) to the user's units, for messages
-    Raises :class:`InputError` where a signed surface is asked for and the shape is not closed.
+    Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,
+    :class:`MissingDependency` where quads are asked for and OpenVDB is not found.
     """
     progress, kind = Progress.of(progress), settings.surface
-    meshes, warnings = {}, []
+    meshes, dropped, warnings = {}, {}, []
+    if settings.faces == "quads" and kind != "none":
+        need_quads()
     if kind in ("double", "both"):
         meshes["double"] = double_cover(values, local, grid, settings.offset, progress.part(0.0, 0.3, "double cover"))
     if kind in WITH_SIDES:
-        crossings = find_crossings(band, local, grid, progress.part(0.3, 0.6, "crossings"))
-        sides = find_sides(values, crossings, local, grid)
+        crossings = find_crossings(band, local, grid, progress.part(0.3, 0.5, "crossings"))
+        sides = find_sides(values, crossings, local, grid, progress.part(0.5, 0.6, "crossings"))
     if kind in ("single", "both"):
         part = progress.part(0.6, 1.0, "single layer")
         meshes["single"], unoriented = single_layer(values, crossings, sides, local, grid, part)
@@ -76,5 +83,7 @@ def extract_surfaces(
                 f"the signed surface, which spans openings of {sides.spanned:.1%} of its area; compare it with the "
                 "single layer"
             )
-    meshes = {kind: without_small_pieces(mesh, settings.pieces) for kind, mesh in meshes.items()}
-    return Surfaces(values, meshes, tuple(warnings)).placed(place)
+    for kind, mesh in meshes.items():
+        mesh = mesh if settings.faces == "quads" else replace(mesh, pairs=0)
+        meshes[kind], dropped[kind] = without_small_pieces(mesh, settings.pieces)
+    return Surfaces(values, meshes, dropped, tuple(warnings)).placed(place)

@@ -44,6 +44,7 @@ def fill_pinholes(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     return Mesh(
         np.concatenate([mesh.vertices, middle[closed] - found.step[closed]]),
         np.concatenate([mesh.faces, fan]).astype(np.int32),
+        mesh.pairs,
     )
 
 

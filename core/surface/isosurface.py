@@ -30,6 +30,14 @@ def isosurface(values: np.ndarray | Blocks, level: float) -> tuple[np.ndarray, n
     return vertices.astype(np.float64), quads.astype(np.int64)
 
 
+def need_quads() -> None:
+    """Raises :class:`MissingDependency` where :func:`isosurface` would give triangles."""
+    try:
+        load_openvdb()
+    except MissingDependency as error:
+        raise MissingDependency(f"quads need OpenVDB: {error}; or ask for faces='triangles'") from error
+
+
 def _by_marching_cubes(values, level):
     try:
         from skimage.measure import marching_cubes

@@ -18,7 +18,7 @@ _LINKED = 0.8  # least confidence of samples in a chain
 _SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
 _WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least membership of them
 _PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
-_CHUNK = 32768  # samples
+_CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 
 

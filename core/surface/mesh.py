@@ -1,6 +1,6 @@
-"""Triangle meshes as plain arrays."""
+"""Triangle meshes as plain arrays, some of whose triangles may be the halves of quads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -9,19 +9,44 @@ from scipy.sparse.csgraph import connected_components
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh.
+    """A mesh of triangles and quads; a quad is there as two triangles.
 
     vertices : (v,3) float64, input units
-    faces    : (f,3) int32, indices into `vertices`
+    faces    : (f,3) int32, indices into `vertices`, all triangles
+    pairs    : number of quads: for k < pairs the faces k and pairs + k are the halves (a,b,c) and (a,c,d) of one
     """
 
     vertices: np.ndarray
     faces: np.ndarray
+    pairs: int = 0
+
+    @property
+    def quads(self) -> np.ndarray:
+        """(pairs,4), wound as their halves are."""
+        return np.column_stack([self.faces[: self.pairs], self.faces[self.pairs : 2 * self.pairs, 2]])
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """The faces that are no half of a quad, (f - 2 pairs,3)."""
+        return self.faces[2 * self.pairs :]
+
+    def of_faces(self, kept: np.ndarray, paired: np.ndarray | None = None) -> "Mesh":
+        """The mesh of the faces marked in `kept`, (f,) bool, in the same order. A quad stays one where both its halves
+        do and it is marked in `paired`, (pairs,) bool or None for all."""
+        halves = kept[: 2 * self.pairs].reshape(2, -1)
+        whole = halves.all(axis=0) if paired is None else halves.all(axis=0) & paired
+        rest = kept.copy()
+        rest[: 2 * self.pairs] &= ~np.tile(whole, 2)
+        first = np.flatnonzero(whole)
+        rows = np.concatenate([first, self.pairs + first, np.flatnonzero(rest)])
+        return replace(self, faces=self.faces[rows], pairs=len(first))
 
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
         ends = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        return np.unique(ends, axis=0, return_counts=True)
+        n = len(self.vertices)
+        key, count = np.unique(ends[:, 0].astype(np.int64) * n + ends[:, 1], return_counts=True)
+        return np.stack(np.divmod(key, n), axis=1).astype(ends.dtype), count
 
     def border_loops(self) -> int:
         """Number of connected curves that the border edges (those of one face) form."""

@@ -1,5 +1,7 @@
 """Consistent winding of a mesh, as far as it can be had."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
@@ -11,8 +13,8 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     """The mesh wound alike across every edge that has two faces, and the number of such edges where that fails.
 
     Faces are visited breadth-first within each patch (patches end at borders and at edges with three or more faces),
-    so failures lie along one line of a patch that cannot be oriented, a Moebius band's for instance. A patch is turned
-    so that its area-weighted normals point away from the mesh's centre; a closed one points outwards.
+    so failures lie along one line of a patch that cannot be oriented, a Moebius band's for instance, and around quads.
+    A patch is turned so that its area-weighted normals point away from the mesh's centre; a closed one points outwards.
     """
     n = len(mesh.faces)
     if not n:
@@ -46,5 +48,18 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     outwards = np.einsum("fi,fi->f", normal, corners.mean(axis=1) - mesh.vertices.mean(axis=0))
     inwards = np.bincount(patch, np.where(turned, -outwards, outwards), patches) < 0
     turned ^= inwards[patch]
+    halves = np.arange(2 * mesh.pairs).reshape(2, -1)
+    whole = patch[halves[0]] == patch[halves[1]]
+    turned[halves[1, whole]] = turned[halves[0, whole]]
     failures = int((against != (turned[a] ^ turned[b])).sum())
-    return Mesh(mesh.vertices, np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces)), failures
+    return _with_turned(mesh, turned), failures
+
+
+def _with_turned(mesh, turned):
+    """The mesh with the faces marked in `turned`, (f,) bool, wound the other way; quads of which one half is are two
+    triangles."""
+    faces, first, second = mesh.faces, turned[: mesh.pairs], turned[mesh.pairs : 2 * mesh.pairs]
+    row = np.arange(len(faces))
+    row[: 2 * mesh.pairs] += np.concatenate([first & second] * 2) * np.repeat([mesh.pairs, -mesh.pairs], mesh.pairs)
+    faces = np.where(turned[:, None], faces[:, [0, 2, 1]], faces)[row]
+    return replace(mesh, faces=faces).of_faces(np.ones(len(faces), bool), first == second)

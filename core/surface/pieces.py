@@ -1,5 +1,7 @@
 """Connected pieces of a mesh."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -29,13 +31,19 @@ def pieces_with_samples(mesh: Mesh, samples: KDTree, cell: float) -> Mesh:
     return _only(mesh, kept[piece])
 
 
-def without_small_pieces(mesh: Mesh, share: float) -> Mesh:
-    """The mesh without the pieces of less than `share` of its largest piece's area."""
+def without_small_pieces(mesh: Mesh, share: float) -> tuple[Mesh, int]:
+    """The mesh without the pieces of less than `share` of its largest piece's area, and how many these were."""
     if share == 0 or not len(mesh.faces):
-        return mesh
+        return mesh, 0
     count, piece = _pieces(mesh)
     area = np.bincount(piece[mesh.faces[:, 0]], mesh.face_areas(), count)
-    return _only(mesh, (area >= share * area.max())[piece])
+    kept = area >= share * area.max()
+    return _only(mesh, kept[piece]), int((~kept).sum())
+
+
+def piece_count(mesh: Mesh) -> int:
+    """Number of connected pieces, of a mesh all of whose vertices are in use."""
+    return _pieces(mesh)[0]
 
 
 def _pieces(mesh):
@@ -48,7 +56,8 @@ def _pieces(mesh):
 def _only(mesh, kept):
     """The pieces of the vertices marked in `kept`, (v,) bool."""
     row = np.cumsum(kept) - 1
-    return Mesh(mesh.vertices[kept], row[mesh.faces[kept[mesh.faces[:, 0]]]].astype(np.int32))
+    mesh = mesh.of_faces(kept[mesh.faces[:, 0]])
+    return replace(mesh, vertices=mesh.vertices[kept], faces=row[mesh.faces].astype(np.int32))
 
 
 def _within(points, others, reach):

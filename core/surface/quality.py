@@ -1,4 +1,4 @@
-"""How well shaped the triangles of a mesh are."""
+"""How well shaped the faces of a mesh are."""
 
 import numpy as np
 
@@ -36,3 +36,37 @@ def triangle_quality(mesh: Mesh) -> dict:
         (areas <= _ZERO_AREA * areas.mean()).mean(),
     )
     return {name: None if value is None else float(value) for name, value in zip(names, values, strict=True)}
+
+
+def quad_quality(mesh: Mesh) -> dict:
+    """Which faces are quads and their shape; the shape None for a mesh without quads.
+
+    quads, triangles  : numbers of faces; a quad's halves count as no triangles here
+    quad_angle        : mean of the quads' smallest corner angles, degrees (90 at best)
+    quad_aspect_p95   : 95th percentile of the longest side to the shortest, 1 at best; None where more than a twentieth
+                        have a side without length
+    quad_fold_p95     : 95th percentile of the angle between the planes of a quad's halves, degrees, 0 in a plane
+    quad_concave      : share of quads with a corner that points inwards, seen along the mean of their normals
+    """
+    found = {"quads": mesh.pairs, "triangles": len(mesh.triangles)}
+    names = "quad_angle", "quad_aspect_p95", "quad_fold_p95", "quad_concave"
+    if not mesh.pairs:
+        return found | dict.fromkeys(names)
+    corners = mesh.vertices[mesh.quads]
+    ahead = np.roll(corners, -1, axis=1) - corners
+    back = np.roll(-ahead, 1, axis=1)
+    turn = np.cross(ahead, back)
+    angle = np.degrees(np.arctan2(np.linalg.norm(turn, axis=2), np.einsum("qki,qki->qk", ahead, back)))
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    sides = np.linalg.norm(ahead, axis=2)
+    evenness = sides.min(axis=1) / np.maximum(sides.max(axis=1), np.finfo(float).tiny)  # one over the aspect ratio
+    least_even = np.percentile(evenness, 5, method="lower")
+    halves = turn[:, 1], turn[:, 3]
+    fold = np.arctan2(np.linalg.norm(np.cross(*halves), axis=1), np.einsum("qi,qi->q", *halves))
+    values = (
+        angle.min(axis=1).mean(),
+        1 / least_even if least_even > 0 else None,
+        np.percentile(np.degrees(fold), 95),
+        (np.einsum("qki,qi->qk", turn, normal) < 0).any(axis=1).mean(),
+    )
+    return found | {name: None if value is None else float(value) for name, value in zip(names, values, strict=True)}

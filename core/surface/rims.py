@@ -7,6 +7,8 @@ which keeps what is longer than about six smoothing lengths s and does not short
 Reweighting keeps corners, where the faired border turns fast, and holds back vertices that go far.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
@@ -56,14 +58,14 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     graph = graph + graph.T
     row = np.flatnonzero(_grown(ends > 0, graph, rows) & ~_grown(fixed, graph, _CLEAR) & (ends == 0))
     if not len(row):
-        return Mesh(vertices, mesh.faces)
+        return replace(mesh, vertices=vertices)
     graph = graph[row]
     degree = np.diff(graph.indptr).astype(float)
     vertices[row] += spsolve((diags(degree) - graph[:, row]).tocsc(), graph @ moved)
     for _ in range(_RELAXED):
         vertices[row] += _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
         _settle(vertices, row, axis, surface)
-    return Mesh(vertices, mesh.faces)
+    return replace(mesh, vertices=vertices)
 
 
 def _axes(mesh):

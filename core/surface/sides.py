@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from ..field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
+from ..progress import Progress
 from .crossings import Crossings, node_strides
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
@@ -67,12 +68,13 @@ class Sides:
         return each(lambda inside, u: np.where(inside, -u, u), self.inside, values)
 
 
-def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid) -> Sides:
+def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Sides:
     """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32, or Blocks of a band wider than
     :func:`needed_band`, and the crossed grid edges.
 
     Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges.
     """
+    progress = Progress.of(progress)
     limit = np.float32(_far(surface, grid) * grid.spacing)
     near = each(lambda u, inner: inner & (u <= limit), values, inner_nodes(values))
     labels, count = regions(each(np.logical_not, near))
@@ -80,10 +82,14 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid) 
     node = marked_nodes(near)
     cluster = each(lambda label: label.astype(np.int32) - 1, labels)
     put(cluster, node, count + np.arange(len(node)))
+    progress(0.1)
     a, b, crossed = _edges_of(node, near, crossings, grid)
-    side = _sides(at_nodes(cluster, a), at_nodes(cluster, b), crossed, count + len(node), outside) < 0
+    progress(0.2)
+    side = _sides(at_nodes(cluster, a), at_nodes(cluster, b), crossed, count + len(node), outside, progress) < 0
+    progress(0.7)
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster))
 
+    progress(0.9)
     inside_a = at_nodes(inside, a)
     differ = inside_a != at_nodes(inside, b)
     alike, spanned = crossed & ~differ, ~crossed & differ
@@ -124,7 +130,7 @@ def _edges_of(node, near, crossings, grid):
     return node, node + node_strides(grid)[axis], np.isin(keys, crossings.changing_sides())
 
 
-def _sides(a, b, crossed, n, outside):
+def _sides(a, b, crossed, n, outside, progress):
     """The side of each of n clusters in [-1,1], from edges (a, b) between them; cluster `outside` is 1."""
     kept = a != b
     a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
@@ -133,7 +139,9 @@ def _sides(a, b, crossed, n, outside):
     free = np.flatnonzero(np.arange(n) != outside)
     matrix = (diags(degree) - links)[free][:, free]
     push = np.asarray(links[free, outside].todense()).reshape(-1)
-    found, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=1000, M=diags(1 / np.maximum(degree[free], 1.0)))
+    progress(0.3)
+    scales = diags(1 / np.maximum(degree[free], 1.0))
+    found, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=1000, M=scales, callback=lambda _: progress(0.4))
     side = np.ones(n)
     side[free] = found
     return side

@@ -15,11 +15,11 @@ from ..progress import Progress
 from .isosurface import isosurface
 from .mesh import Mesh
 from .pieces import pieces_with_samples
+from .settling import settled
 from .sides import Sides
-from .triangles import triangles
+from .triangles import mesh_of
 
 _CLAMP = 3.0  # cells; farther values do not matter for the mesh
-_ROUNDS = 2
 _SMOOTHING = 20  # rounds, over gaps
 
 
@@ -42,11 +42,14 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     limit = np.float32(_CLAMP * grid.spacing)
     cells, faces = isosurface(each(lambda u: np.clip(u, -limit, limit), values), 0.0)
     vertices = grid.origin + grid.spacing * cells
-    on = surface.project(vertices, progress.part(0.0, 0.4)).distance <= grid.spacing
-    for turn in range(_ROUNDS):
-        vertices[on] -= surface.project(vertices[on], progress.part(0.4 + 0.3 * turn, 0.7 + 0.3 * turn)).step
-    mesh = Mesh(vertices, triangles(vertices, faces).astype(np.int32))
+    found = surface.project(vertices, progress.part(0.0, 0.7))
+    on = found.distance <= grid.spacing
+    vertices[on] = settled(vertices[on], found.step[on], surface, grid.spacing, progress.part(0.7, 0.9))
+    progress(0.9)
+    mesh = mesh_of(vertices, faces)
+    progress(0.92)
     _relax(mesh, np.flatnonzero(~on))
+    progress(0.96)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
 
 

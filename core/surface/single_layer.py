@@ -11,12 +11,12 @@ from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
 from .rims import smooth_rims
+from .settling import settled
 from .sharing import shared_vertices
 from .sides import Sides
 from .signed import signed_mesh
-from .triangles import triangles
+from .triangles import mesh_of
 
-_ROUNDS = 2
 _MEETING = 0.01  # share of crossings at meetings of sheets
 _PINHOLES = 1e-3  # share of edges that may be open in a surface that is as good as closed
 _STIFFNESS = 0.05  # of vertices against moving along what their planes leave open
@@ -67,10 +67,9 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     meeting = kind > 0
     vertices[meeting] += _to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), grid)[meeting]
     free = kind < 2
-    for turn in range(_ROUNDS):
-        part = progress.part(0.5 * turn, 0.5 + 0.5 * turn)
-        vertices[free] -= surface.project(vertices[free], part).step
-    mesh = _without_repeats(Mesh(vertices, triangles(vertices, quads)))
+    step = surface.project(vertices[free], progress.part(0.0, 0.7)).step
+    vertices[free] = settled(vertices[free], step, surface, grid.spacing, progress.part(0.7, 1.0))
+    mesh = _without_repeats(mesh_of(vertices, quads))
     mesh = pieces_with_samples(mesh, surface.tree, grid.spacing)
     return smooth_rims(fill_pinholes(mesh, surface, grid.spacing), surface, grid.spacing)
 
@@ -95,4 +94,6 @@ def _without_repeats(mesh):
     ordered = np.sort(mesh.faces, axis=1)
     proper = np.flatnonzero((np.diff(ordered, axis=1) > 0).all(axis=1))
     _, first = np.unique(ordered[proper], axis=0, return_index=True)
-    return Mesh(mesh.vertices, mesh.faces[proper[np.sort(first)]])
+    kept = np.zeros(len(ordered), bool)
+    kept[proper[first]] = True
+    return mesh.of_faces(kept)

@@ -2,6 +2,14 @@
 
 import numpy as np
 
+from .mesh import Mesh
+
+
+def mesh_of(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    """A mesh out of vertices (v,3) and quads (f,4), which stay pairs of triangles, or triangles (f,3)."""
+    quads = len(faces) if faces.shape[1] == 4 else 0
+    return Mesh(vertices, triangles(vertices, faces).astype(np.int32), quads)
+
 
 def triangles(vertices, faces):
     """Triangles of a mesh of quads: (v,3) vertices, (f,4) faces -> (2f,3); triangles (f,3) come back as they are.

@@ -89,7 +89,7 @@ def voronoi_facets(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progr
 def joined(blocks: list[Facets]) -> tuple[Facets, np.ndarray]:
     """The facets of all blocks, and where each of these was among those of the blocks one after another."""
     pairs = np.concatenate([facets.pairs for facets in blocks])
-    order = np.lexsort(pairs.T[::-1])
+    order = np.argsort(pairs[:, 0] * (pairs.max(initial=0) + 1) + pairs[:, 1])
     return Facets(pairs[order], np.concatenate([facets.area for facets in blocks])[order]), order
 
 

@@ -43,6 +43,17 @@ def test_the_bytes_are_those_the_format_prescribes(folder):
     assert (folder / "mesh.ply").read_bytes() == header + body
 
 
+@pytest.mark.parametrize(("pairs", "sizes"), [(0, [3] * 4), (1, [4, 3, 3]), (2, [4, 4])])
+def test_quads_are_written_as_such_before_the_triangles(folder, pairs, sizes):
+    mesh = Mesh(FAR_TETRAHEDRON.vertices, FAR_TETRAHEDRON.faces, pairs)
+    write_mesh(folder / "mesh.ply", mesh)
+    data = PlyData.read(folder / "mesh.ply")
+    found = [face.tolist() for face in data["face"]["vertex_indices"]]
+    assert found == [*mesh.quads.tolist(), *mesh.triangles.tolist()]
+    assert [len(face) for face in found] == sizes
+    assert b"property list uchar int vertex_indices" in (folder / "mesh.ply").read_bytes()
+
+
 def test_an_empty_mesh(folder):
     write_mesh(folder / "mesh.ply", Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))
     assert [len(element) for element in PlyData.read(folder / "mesh.ply")] == [0, 0]

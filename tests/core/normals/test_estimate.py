@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from core import Cancelled, InputError, MissingDependency, Settings, reconstruct
+from core import Cancelled, InputError, MissingDependency, Settings, SettingsError, reconstruct
+from core.normals.energy_torch import torch_device
 from core.normals.estimate import checked_constraints, estimate_normals
 from core.normals.pca import pca_normals
 from core.points import local_spacing
@@ -65,6 +66,7 @@ def test_torch_gives_the_normals_of_numpy():
     auto = estimate_normals(POINTS, spacing, Settings(solver="energy"))[2]
     assert np.median(degrees(by_numpy, by_torch)) < 0.5
     assert report["backend"] == auto["backend"] == "torch"
+    assert report["device"] in {"cpu", "cuda"}
 
 
 def test_missing_torch_is_an_error_when_asked_for_and_numpy_otherwise(monkeypatch):
@@ -73,6 +75,22 @@ def test_missing_torch_is_an_error_when_asked_for_and_numpy_otherwise(monkeypatc
     with pytest.raises(MissingDependency, match="pip install torch"):
         estimate_normals(POINTS, spacing, Settings(solver="energy", backend="torch"))
     assert estimate_normals(POINTS, spacing, Settings(solver="energy"))[2]["backend"] == "numpy"
+
+
+def test_a_gpu_is_used_where_there_is_one_and_refused_where_not(monkeypatch):
+    cuda = pytest.importorskip("torch").cuda
+    monkeypatch.setattr(cuda, "is_available", lambda: False)
+    assert (torch_device("auto"), torch_device("cpu")) == ("cpu", "cpu")
+    spacing = local_spacing(POINTS)
+    estimate_normals(POINTS, spacing, Settings(device="cuda"))  # has no part in the other solvers
+    monkeypatch.setattr("core.normals.estimate.facet_polygons", None)  # before any work is done
+    for backend in ("torch", "auto"):
+        with pytest.raises(MissingDependency, match=r"sees no Nvidia GPU; .* or use device 'cpu'"):
+            estimate_normals(POINTS, spacing, Settings(solver="energy", backend=backend, device="cuda"))
+    with pytest.raises(SettingsError, match="'numpy', which uses no GPU"):
+        estimate_normals(POINTS, spacing, Settings(solver="energy", backend="numpy", device="cuda"))
+    monkeypatch.setattr(cuda, "is_available", lambda: True)
+    assert (torch_device("auto"), torch_device("cuda"), torch_device("cpu")) == ("cuda", "cuda", "cpu")
 
 
 @pytest.mark.parametrize("settings", ["solver='reflection'", "solver='energy', backend='numpy'"])

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from core import Cancelled
-from core.field.grid import Grid
-from core.field.integration import BAND
+from core import Cancelled, estimate_normals
+from core.field.grid import Grid, fit_grid
+from core.field.integration import BAND, distance_field
 from core.field.local_surface import fit_local_surface
 from core.field.steps import NearBand
 from core.points import local_spacing
-from core.surface.crossings import _HAIR, Crossings, find_crossings, node_strides
+from core.surface.crossings import _HAIR, Crossings, _may_be_covered, find_crossings, node_strides
 from tests import shapes
 
 GRID = Grid(np.array([-1.31, -1.29, -1.33]), 0.1, (28, 27, 28))
@@ -121,3 +121,27 @@ def test_an_edge_crossed_twice_changes_no_side():
     node, axis = np.array([500, 500, 500, 501]), np.array([0, 0, 1, 0])
     crossings = Crossings(node, axis, np.zeros((4, 3)), np.empty(0, int), np.zeros((4, 3)))
     assert crossings.changing_sides().tolist() == [1501, 1503]
+
+
+@pytest.mark.parametrize("name", ["sphere", "disc", "junction"])
+def test_edges_left_unprojected_change_nothing(name, monkeypatch):
+    points = {"sphere": shapes.sphere(1000), "disc": shapes.disc(500), "junction": shapes.junction(1500)}[name]
+    spacing = local_spacing(points)
+    normals, confidence, _ = estimate_normals(points, spacing)
+    surface = fit_local_surface(points, normals, confidence, spacing, 3.0)
+    grid = fit_grid(points, 32)
+    _, band = distance_field(surface, grid)
+    found = find_crossings(band, surface, grid)
+    spared = []
+
+    def all_of_them(band, edge, place, grid):
+        spared.append((~_may_be_covered(band, edge, place, grid)).mean())
+        return np.ones(len(edge), bool)
+
+    monkeypatch.setattr("core.surface.crossings._may_be_covered", all_of_them)
+    expected = find_crossings(band, surface, grid)
+    assert spared[0] > 0.3
+    assert len(found.node) > 500
+    np.testing.assert_array_equal(found.node, expected.node)
+    np.testing.assert_array_equal(found.axis, expected.axis)
+    np.testing.assert_allclose(found.place, expected.place, atol=1e-6)

@@ -41,3 +41,39 @@ def test_no_faces():
     empty = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
     edges, counts = empty.edge_counts()
     assert (edges.shape, counts.shape, empty.face_areas().shape) == ((0, 2), (0,), (0,))
+
+
+# two quads and a triangle, in a row
+STRIP = Mesh(
+    np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0], [3, 0, 0]], float),
+    np.array([[0, 1, 4], [1, 2, 5], [0, 4, 3], [1, 5, 4], [2, 6, 5]], np.int32),
+    pairs=2,
+)
+
+
+def test_pairs_of_faces_are_quads():
+    assert STRIP.quads.tolist() == [[0, 1, 4, 3], [1, 2, 5, 4]]
+    assert STRIP.triangles.tolist() == [[2, 6, 5]]
+    assert (TETRAHEDRON.quads.shape, len(TETRAHEDRON.triangles)) == ((0, 4), 4)
+
+
+@pytest.mark.parametrize(
+    ("gone", "quads", "triangles"),
+    [
+        ([], [[0, 1, 4, 3], [1, 2, 5, 4]], [[2, 6, 5]]),
+        ([4], [[0, 1, 4, 3], [1, 2, 5, 4]], []),
+        ([0, 2], [[1, 2, 5, 4]], [[2, 6, 5]]),
+        ([0], [[1, 2, 5, 4]], [[0, 4, 3], [2, 6, 5]]),
+        ([3], [[0, 1, 4, 3]], [[1, 2, 5], [2, 6, 5]]),
+    ],
+)
+def test_a_quad_that_loses_a_half_is_a_triangle(gone, quads, triangles):
+    found = STRIP.of_faces(~np.isin(np.arange(5), gone))
+    assert (found.quads.tolist(), found.triangles.tolist()) == (quads, triangles)
+    assert len(found.faces) == 5 - len(gone)
+
+
+def test_quads_that_are_not_to_be_are_triangles():
+    found = STRIP.of_faces(np.ones(5, bool), np.array([False, True]))
+    assert found.quads.tolist() == [[1, 2, 5, 4]]
+    assert found.triangles.tolist() == [[0, 1, 4], [0, 4, 3], [2, 6, 5]]

@@ -82,3 +82,31 @@ def test_only_windings_change():
     mesh, _ = orient(given)
     np.testing.assert_array_equal(mesh.vertices, given.vertices)
     np.testing.assert_array_equal(np.sort(mesh.faces, axis=1), np.sort(given.faces, axis=1))
+
+
+@pytest.mark.parametrize("twisted", [False, True])
+def test_quads_stay_quads_and_their_halves_are_wound_alike(twisted):
+    plain = band(40, twisted)
+    turned = np.tile(np.arange(40) % 3 == 0, 2)
+    halves = np.where(turned[:, None], plain.faces[:, [0, 2, 1]], plain.faces)
+    halves[:80] = np.where(turned[:, None], np.roll(halves, 40, axis=0), halves)
+    found, _ = orient(Mesh(plain.vertices, halves, pairs=40))
+    assert found.pairs == 40
+    assert {frozenset(q) for q in found.quads.tolist()} == {
+        frozenset(q) for q in Mesh(plain.vertices, plain.faces, 40).quads.tolist()
+    }
+    edges = np.stack([found.quads, np.roll(found.quads, -1, axis=1)], axis=2).reshape(-1, 2)
+    backward = len(edges) - len(np.unique(edges, axis=0))
+    assert backward <= twisted
+
+
+@pytest.mark.parametrize(("middle", "pairs"), [((0, 0.5, -5), 1), ((-3, 0.5, 0.5), 0)])
+def test_a_quad_whose_halves_are_wound_by_themselves_may_end_as_triangles(middle, pairs):
+    """A third triangle on its diagonal parts the halves, and each is turned to face away from the middle of all
+    vertices, which is above the one and below the other in the second case."""
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 1], [0, 0.5, -1]]
+    vertices = np.concatenate([corners, np.tile(middle, (100, 1))])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 4]], np.int32)
+    found, _ = orient(Mesh(vertices, faces, pairs=1))
+    assert {frozenset(face) for face in found.faces.tolist()} == {frozenset(face) for face in faces.tolist()}
+    assert found.pairs == pairs

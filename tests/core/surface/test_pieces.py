@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Mesh, Settings, reconstruct
-from core.surface.pieces import pieces_with_samples, without_small_pieces
+from core.surface.pieces import piece_count, pieces_with_samples, without_small_pieces
 from tests import shapes
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
@@ -85,18 +85,20 @@ def test_a_tiny_part_beside_a_large_one_keeps_both_its_layers():
 def test_pieces_below_a_share_of_the_largest_go(share, kept):
     """Two strips of a hundred triangles and one of a quarter of that."""
     mesh = joined(strip(0, 100), strip(5, 25), strip(9, 100))
-    found = shapes.components(without_small_pieces(mesh, share))
-    assert [len(piece.faces) for piece in found] == [100, 100, 25][:kept]
+    found, dropped = without_small_pieces(mesh, share)
+    assert [len(piece.faces) for piece in shapes.components(found)] == [100, 100, 25][:kept]
+    assert (piece_count(found), dropped) == (kept, 3 - kept)
 
 
 def test_area_counts_not_faces():
     vertices, faces = strip(0, 4)
     mesh = joined((vertices * 10, faces), strip(50, 300))
-    assert [len(piece.faces) for piece in shapes.components(without_small_pieces(mesh, 0.9))] == [4]
+    assert [len(piece.faces) for piece in shapes.components(without_small_pieces(mesh, 0.9)[0])] == [4]
 
 
 def test_no_pieces_at_all():
-    assert len(without_small_pieces(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)), 0.5).faces) == 0
+    mesh, dropped = without_small_pieces(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)), 0.5)
+    assert (len(mesh.faces), dropped) == (0, 0)
 
 
 @pytest.mark.parametrize("surface", ["double", "single", "signed"])
@@ -107,4 +109,7 @@ def test_the_setting_leaves_a_small_ball_out(surface):
         run = reconstruct(points, Settings(resolution=48, surface=surface, pieces=share))
         mesh = run.sheet if surface == "single" else run.surface
         assert mesh.vertices[:, 0].max() == pytest.approx(right, abs=0.05)
-        assert run.report["meshes"][surface]["vertices"] == len(mesh.vertices)
+        found = run.report["meshes"][surface]
+        assert found["vertices"] == len(mesh.vertices)
+        layers = 2 if surface == "double" else 1
+        assert (found["pieces"], found["pieces_dropped"]) == ((2 * layers, 0) if share == 0 else (layers, layers))

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from core import Mesh
-from core.surface.quality import triangle_quality
+from core.surface.quality import quad_quality, triangle_quality
+from core.surface.triangles import mesh_of
 
 
 def triangles(*corners):
@@ -57,4 +58,47 @@ def test_the_aspect_ratio_leaves_the_worst_twentieth_out():
 
 def test_no_faces():
     found = triangle_quality(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))
+    assert set(found.values()) == {None}
+
+
+def quads(*corners):
+    """A mesh of quads that share no vertex, each given by its four corners in space."""
+    vertices = np.array(corners, float).reshape(-1, 3)
+    return mesh_of(vertices, np.arange(len(vertices)).reshape(-1, 4))
+
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+BOX = [[0, 0, 0], [3, 0, 0], [3, 1, 0], [0, 1, 0]]
+RHOMB = [[0, 0, 0], [2, 1, 0], [4, 0, 0], [2, -1, 0]]
+FOLDED = [[0, -1, 0], [2, 0, 0], [0, 1, 0], [-2, 0, 1]]  # about the y axis, the shorter way across
+DART = [[0, 0, 0], [2, -1, 0], [0.5, 0, 0], [2, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("corners", "angle", "aspect", "fold", "concave"),
+    [
+        (SQUARE, 90, 1, 0, 0),
+        (BOX, 90, 3, 0, 0),
+        (RHOMB, np.degrees(2 * np.arctan(0.5)), 1, 0, 0),
+        (FOLDED, None, None, np.degrees(np.arctan(0.5)), 0),
+        (DART, None, np.sqrt(5 / 3.25), 0, 1),
+    ],
+)
+def test_quads_in_closed_form(corners, angle, aspect, fold, concave):
+    for turn in range(4):
+        found = quad_quality(quads(np.roll(corners, turn, axis=0)))
+        assert (found["quads"], found["triangles"], found["quad_concave"]) == (1, 0, concave)
+        assert found["quad_fold_p95"] == pytest.approx(fold, abs=1e-5)
+        assert angle is None or found["quad_angle"] == pytest.approx(angle)
+        assert aspect is None or found["quad_aspect_p95"] == pytest.approx(aspect)
+
+
+def test_a_quad_without_a_side():
+    found = quad_quality(quads([[0, 0, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]]))
+    assert (found["quad_angle"], found["quad_aspect_p95"]) == (0, None)
+
+
+def test_no_quads():
+    found = quad_quality(triangles(EVEN))
+    assert (found.pop("quads"), found.pop("triangles")) == (0, 1)
     assert set(found.values()) == {None}

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core import Mesh
-from core.surface.triangles import triangles
+from core.surface.triangles import mesh_of, triangles
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 
@@ -18,6 +18,17 @@ def test_the_shorter_diagonal_splits_a_quad(corner, diagonal):
     vertices[corner] += 0.4 * (0.5 - vertices[corner])
     faces = triangles(vertices, np.array([[0, 1, 2, 3]]))
     assert set.intersection(*map(set, faces.tolist())) == diagonal
+
+
+def test_the_quads_of_a_mesh_are_those_it_was_made_of():
+    """Wound alike, whichever corner comes first."""
+    vertices = np.concatenate([SQUARE, SQUARE[1:3] * [2, 1.5, 1]])
+    quads = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    mesh = mesh_of(vertices, quads)
+    for given, found in zip(quads.tolist(), mesh.quads.tolist(), strict=True):
+        assert found in [given[k:] + given[:k] for k in range(4)]
+    assert (mesh.faces.dtype, len(mesh.triangles)) == (np.int32, 0)
+    assert mesh_of(SQUARE, np.array([[0, 1, 2]])).pairs == 0
 
 
 def test_area_and_winding_stay():
