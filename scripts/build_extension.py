@@ -20,6 +20,7 @@ SCIPY = {"3.11": "1.17.1", "3.13": "1.18.1"}  # Blender 4.5-5.0 and 5.1-5.2
 PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64"],
     "windows-x64": ["win_amd64"],
+    "windows-arm64": ["win_arm64"],
     "macos-arm64": ["macosx_12_0_arm64"],
     "macos-x64": ["macosx_10_14_x86_64", "macosx_14_0_x86_64"],  # pip takes the first that exists
 }

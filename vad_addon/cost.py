@@ -1,4 +1,6 @@
-"""What a run would cost, asked before it starts."""
+"""What a run would cost, asked before it starts: shown in the sidebar for as long as the same points are selected."""
+
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -9,30 +11,76 @@ from ..core.field.grid import fit_grid
 from ..core.points import local_spacing, prepare_samples
 from ..core.settings import Settings, options
 from . import points_in, status
-from .properties import settings_from
+from .properties import chosen, settings_from
 
 
-def cost_in_words(points: np.ndarray, settings: Settings) -> list[str]:
-    """Lines on the points (n,3), the resolution that suits them, and the time and memory that `settings` would take.
+@dataclass(frozen=True)
+class Points:
+    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, and the factor that
+    takes these lengths to scene units."""
 
-    Raises :class:`InputError` for points that cannot be used.
-    """
-    samples = prepare_samples(points)
-    spacing = local_spacing(samples.points)
-    grid = fit_grid(samples.points, settings.resolution)
-    estimate = estimate_cost(spacing, grid, settings)
-    low, high = options()["resolution"].metadata["limits"]
-    one_cell_each = grid.spacing * settings.resolution / np.median(spacing)
-    return [
-        f"{len(samples.points):,} points",
-        f"{np.median(spacing) * samples.scale:.3g} apart",
-        f"Suits: resolution {round(float(np.clip(one_cell_each, low, high)))}",
-        f"At {settings.resolution}: {status.duration(estimate.seconds)}, {estimate.memory_mb:,.0f} MiB",
-    ]
+    corners: np.ndarray
+    spacing: np.ndarray
+    scale: float
+
+    @classmethod
+    def of(cls, points: np.ndarray) -> "Points":
+        """Those of (n,3) points. Raises :class:`InputError` for points that cannot be used."""
+        samples = prepare_samples(points)
+        corners = np.stack([samples.points.min(axis=0), samples.points.max(axis=0)])
+        return cls(corners, local_spacing(samples.points), samples.scale)
+
+    def suits(self) -> int:
+        """The resolution at which a cell is as large as the points are apart."""
+        low, high = options()["resolution"].metadata["limits"]
+        resolution = low * fit_grid(self.corners, low).spacing / np.median(self.spacing)
+        return round(float(np.clip(resolution, low, high)))
+
+    def cost(self, settings: Settings) -> list[str]:
+        """Lines on these points and on the time and memory that `settings` would take."""
+        estimate = estimate_cost(self.spacing, fit_grid(self.corners, settings.resolution), settings)
+        return [
+            f"{len(self.spacing):,} points, {np.median(self.spacing) * self.scale:.3g} apart",
+            f"Suits: resolution {self.suits()}",
+            f"At {settings.resolution}: {status.duration(estimate.seconds)}, {estimate.memory_mb:,.0f} MiB",
+        ]
+
+
+_asked = None  # (what was selected, its Points)
+_told = {}  # settings: the lines on them
+
+
+def lines(context: bpy.types.Context) -> list[str]:
+    """What is known of the cost for what is selected and set now; empty where nobody asked yet."""
+    global _asked
+    if _asked is not None and _asked[0] != _selected(context):
+        _asked = None
+        _told.clear()
+    if _asked is None:
+        return []
+    try:
+        settings = settings_from(context.scene.vad)
+        if settings not in _told:
+            _told.clear()
+            _told[settings] = _asked[1].cost(settings)
+    except VADError as error:
+        return [str(error)]
+    return _told[settings]
+
+
+def suits() -> int:
+    """The resolution that suits the points asked about, 0 where nobody asked."""
+    return _asked[1].suits() if _asked else 0
+
+
+def _selected(context):
+    objects = points_in.sources(context)
+    names = [(obj.session_uid, obj.mode) for obj in objects]
+    return names, points_in.point_count(objects, context), chosen(context.scene.vad)["selected_only"]
 
 
 class VAD_OT_estimate(bpy.types.Operator):
-    """Say how long the run would take, how much memory it would need, and which resolution suits the points"""
+    """Show how long the run would take, how much memory it would need, and which resolution suits the points"""
 
     bl_idname = "vad.estimate"
     bl_label = "Estimate Cost"
@@ -45,19 +93,35 @@ class VAD_OT_estimate(bpy.types.Operator):
         return not problem
 
     def execute(self, context):
-        stored = context.scene.vad
+        global _asked
         try:
+            stored = context.scene.vad
             source = points_in.gather(points_in.sources(context), context, stored.selected_only)
-            lines = cost_in_words(source.points, settings_from(stored))
+            _asked = _selected(context), Points.of(source.points)
+            _told.clear()
+            settings_from(stored)
         except VADError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, "; ".join(lines))
-        if not bpy.app.background:
-            context.window_manager.popup_menu(lambda menu, _: _draw(menu.layout, lines), title=source.name, icon="INFO")
+        self.report({"INFO"}, "; ".join(lines(context)))
         return {"FINISHED"}
 
 
-def _draw(layout, lines):
-    for line in lines:
-        layout.label(text=line)
+class VAD_OT_use_resolution(bpy.types.Operator):
+    """Take the resolution at which a cell is as large as the points are apart: finer ones show hardly more detail"""
+
+    bl_idname = "vad.use_resolution"
+    bl_label = "Use It"
+    bl_options = {"INTERNAL", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Estimate the cost first")
+        return bool(lines(context))
+
+    def execute(self, context):
+        context.scene.vad.resolution = suits()
+        return {"FINISHED"}
+
+
+CLASSES = VAD_OT_estimate, VAD_OT_use_resolution

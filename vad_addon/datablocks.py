@@ -10,16 +10,18 @@ from . import volume_files
 from .attributes import Attribute, write
 
 
-def mesh_data(name: str, vertices, faces, origin, attributes: dict[str, Attribute]) -> bpy.types.Mesh:
-    """A triangle mesh, shaded smooth as all new ones are: (v,3) `vertices` relative to `origin`, (f,3) `faces`."""
+def mesh_data(name: str, vertices, kinds, origin, attributes: dict[str, Attribute]) -> bpy.types.Mesh:
+    """A mesh, shaded smooth as all new ones are: (v,3) `vertices` relative to `origin`, and its faces, an array (f,k)
+    for each number of corners."""
     data = bpy.data.meshes.new(name)
-    count = len(faces)
+    corners = np.concatenate([faces.ravel() for faces in kinds]).astype(np.int32)
+    sizes = np.concatenate([np.full(len(faces), faces.shape[1], np.int32) for faces in kinds])
     data.vertices.add(len(vertices))
     data.vertices.foreach_set("co", _float32(vertices - origin))
-    data.loops.add(3 * count)
-    data.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).ravel())
-    data.polygons.add(count)
-    data.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    data.loops.add(len(corners))
+    data.loops.foreach_set("vertex_index", corners)
+    data.polygons.add(len(sizes))
+    data.polygons.foreach_set("loop_start", (np.cumsum(sizes) - sizes).astype(np.int32))
     data.update(calc_edges=True)
     write(data, attributes)
     return data

@@ -1,12 +1,14 @@
 """From the outcome of a run to objects in the scene."""
 
+import json
 from contextlib import ExitStack
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ..core.errors import VADError
-from . import datablocks, materials, results, volume_files
+from . import datablocks, materials, overlay, results, stored_field, volume_files
 from .attributes import Attribute
 from .outcome import Outcome
 from .points_in import Source, object_of
@@ -26,6 +28,7 @@ def deliver(
     Where this source has results from an earlier run, these are updated (those in `collection` where it is given), and
     the objects keep the materials and the modifiers that the user gave them; `keep_both` makes a second collection
     instead.
+    The field stays as it is where the outcome is made from its file.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
     for large coordinates. Of new results only the mesh is shown. A volume that cannot be written becomes a warning: the
     other results are delivered.
@@ -38,6 +41,10 @@ def deliver(
     if collection is not None and any(obj.mode != "OBJECT" for obj in collection.objects):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
+    roles, known = results.ROLES, results.member(collection, results.FIELD) if collection is not None else None
+    if known is not None and outcome.volume == volume_files.file_of(known.data):
+        report = json.dumps(json.loads(collection[results.REPORT]) | json.loads(outcome.report))
+        outcome, roles = replace(outcome, volume=None, report=report), [role for role in roles if role != results.FIELD]
     with ExitStack() as rollback:
         made = _data(source, outcome, warnings, rollback)
         if collection is None:
@@ -45,13 +52,16 @@ def deliver(
             scene.collection.children.link(collection)
         rollback.pop_all()
     before, mesh = set(collection.objects), results.mesh(collection)
-    for role in results.ROLES:
+    for role in roles:
         _place(collection, role, made.get(role), outcome.origin)
     stays = before if results.mesh(collection) == mesh else set()
     _show_mesh_first(scene, collection, stays)
     _colour(set(collection.objects) - before, source)
     if results.FIELD in made:
         materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell, outcome.shape)
+    if results.member(collection, results.FIELD) is not None:
+        made_from = overlay.samples_of(made[results.SAMPLES])[:3]
+        collection[results.FIELD_OF] = stored_field.identity(*made_from, json.loads(outcome.report)["settings"])
     if origin is not None:
         collection[results.SOURCE] = origin
     collection[results.REPORT] = outcome.report
@@ -85,7 +95,8 @@ def _data(source, outcome, warnings, rollback):
         if skin is not None:
             on_skin = {key: attribute[skin.nearest] for key, attribute in carried.items()}
             on_skin |= dict(distance=Attribute.of(skin.distance), confidence=own["confidence"][skin.nearest])
-            made[role] = keep(datablocks.mesh_data(f"{name} {role}", skin.vertices, skin.faces, origin, on_skin))
+            kinds = skin.quads, skin.triangles
+            made[role] = keep(datablocks.mesh_data(f"{name} {role}", skin.vertices, kinds, origin, on_skin))
     if outcome.volume is not None:
         try:
             path = volume_files.adopt(name, outcome.volume)
@@ -144,7 +155,12 @@ def _summary(outcome):
     yield f"{len(outcome.points):,} samples"
     yield " × ".join(map(str, outcome.shape)) + " grid"
     if outcome.surface is not None:
-        yield f"{len(outcome.surface.faces):,} triangles"
+        yield _faces(outcome.surface)
     if outcome.sheet is not None:
-        yield f"{len(outcome.sheet.faces):,} triangles in the single layer"
+        yield f"{_faces(outcome.sheet)} in the single layer"
     yield f"{outcome.seconds:.1f} s"
+
+
+def _faces(skin):
+    kinds = {"quads": skin.quads, "triangles": skin.triangles}
+    return " and ".join(f"{len(faces):,} {kind}" for kind, faces in kinds.items() if len(faces)) or "no faces"

@@ -23,7 +23,7 @@ CLASSES = (
     operators.VAD_OT_reconstruct,
     operators.VAD_OT_cancel,
     *stages.CLASSES,
-    cost.VAD_OT_estimate,
+    *cost.CLASSES,
     *extras.CLASSES,
     preferences.VAD_OT_clear_cache,
     preferences.VAD_preferences,
@@ -34,6 +34,11 @@ CLASSES = (
     *panel.CLASSES,
 )
 _NEW_DATA = bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
+_SAVES = (
+    (bpy.app.handlers.save_pre, volume_files.bring_along),
+    (bpy.app.handlers.save_post, volume_files.keep_saved),
+    (bpy.app.handlers.save_post_fail, volume_files.put_back),
+)
 
 
 def register():
@@ -44,17 +49,19 @@ def register():
     presets.register()
     bpy.app.handlers.load_post.append(preferences.prepare_scenes)
     bpy.app.handlers.load_post.append(volume_files.delete_unused)
-    bpy.app.handlers.save_post.append(volume_files.keep_saved)
+    for handlers, handler in _SAVES:
+        handlers.append(handler)
     for handlers in _NEW_DATA:
         handlers.append(overlay.on_new_data)
 
 
 def unregister():
-    run.stop()
+    run.shut_down()
     overlay.remove()
     for handlers in _NEW_DATA:
         handlers.remove(overlay.on_new_data)
-    bpy.app.handlers.save_post.remove(volume_files.keep_saved)
+    for handlers, handler in _SAVES:
+        handlers.remove(handler)
     bpy.app.handlers.load_post.remove(volume_files.delete_unused)
     bpy.app.handlers.load_post.remove(preferences.prepare_scenes)
     volume_files.delete_unused_at_exit()

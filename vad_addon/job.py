@@ -1,6 +1,7 @@
 """A run in a process of its own: started, watched and stopped from Blender's side, which never waits for it."""
 
 import contextlib
+import errno
 import json
 import os
 import shutil
@@ -27,11 +28,15 @@ sys.exit(importlib.import_module("vad_extension.vad_addon.worker").main(pathlib.
 
 _NO_WINDOW = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows would flash a console
 
+_LEAST_SPACE = 1 << 20  # bytes
+
 _running = None
+_stopped = []  # jobs whose processes may not be dead yet
 
 
 class Job:
-    """One worker process and the folder through which it talks; :meth:`stop` ends both and may be called at any time.
+    """One worker process and the folder through which it talks; :meth:`stop` ends both and may be called at any time,
+    :meth:`cleared` says when both are gone.
 
     fraction, stage : progress as last heard
     """
@@ -45,6 +50,7 @@ class Job:
             self._start()
         except OSError as error:
             self.stop()
+            self.cleared(wait=True)
             raise _unusable(temporary, error) from error
 
     def _start(self):
@@ -73,6 +79,8 @@ class Job:
         """What the run found. Raises :class:`VADError` with the reason, one line, where it failed."""
         if self._process.returncode == 0:
             return Outcome.load(self._folder / "outcome.npz")
+        if shutil.disk_usage(self._folder).free < _LEAST_SPACE:  # then nothing else could be told
+            raise _unusable(self._folder.parent, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
         raise VADError(self._error or self._sudden_end())
 
     def seconds_left(self) -> float | None:
@@ -81,15 +89,25 @@ class Job:
         return elapsed * (1 - self.fraction) / self.fraction if self.fraction > 0.02 and elapsed > 1 else None
 
     def stop(self) -> None:
-        """End the process if it still runs and remove everything exchanged with it."""
+        """Let the system end the process, at once and whatever it does. That takes a moment, longer on a busy machine,
+        which nobody waits for here."""
         if self._process is not None:
             self._process.kill()
             with contextlib.suppress(OSError):
                 self._process.stdin.close()
-            self._process.wait()
         if self._output is not None:
             self._output.close()
+
+    def cleared(self, wait: bool = False) -> bool:
+        """Whether the process that was stopped is dead, or wait until it is; then remove what was exchanged with it:
+        before, it might write more."""
+        if self._process is not None:
+            if wait:
+                self._process.wait()
+            if self._process.poll() is None:
+                return False
         shutil.rmtree(self._folder, ignore_errors=True)
+        return True
 
     def _complete_lines(self):
         while line := self._output.readline():
@@ -127,11 +145,19 @@ def running() -> Job | None:
 
 
 def stop() -> None:
-    """Stop the job under way, if any, and remove what it left."""
+    """Stop the job under way, if any; call :func:`clear` from time to time from then on."""
     global _running
     if _running is not None:
         _running.stop()
+        _stopped.append(_running)
         _running = None
+
+
+def clear(wait: bool = False) -> bool:
+    """Remove what stopped jobs left, as far as their processes are dead, or wait until they are; True once all is
+    gone."""
+    _stopped[:] = [job for job in _stopped if not job.cleared(wait)]
+    return not _stopped
 
 
 def _library_path():
@@ -142,6 +168,6 @@ def _library_path():
 
 def _unusable(temporary, error):
     return VADError(
-        f"The run cannot start: {error.strerror or error} ({temporary}); free space there, or choose another folder "
+        f"The run cannot go on: {error.strerror or error} ({temporary}); free space there, or choose another folder "
         "for temporary files in Blender's preferences"
     )

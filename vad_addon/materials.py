@@ -8,6 +8,7 @@ _FOG = "vad_fog"  # custom property that tells our materials from the user's
 _OPACITY = 1.5  # optical depth per cell where the fog is densest, in renders; it fades out over two cells
 _NEAR_AND_FAR = (1.0, 0.45, 0.03, 1.0), (0.01, 0.05, 0.45, 1.0)
 _LINE, _SURFACE = (0.01, 0.01, 0.03, 1.0), (1.0, 1.0, 1.0, 1.0)
+_LINE_EVERY, _LINE_WIDTH = 2.0, 0.25  # cells
 _DISPLAY = 0.5  # the same in the viewport's solid view
 
 
@@ -47,7 +48,7 @@ def _fog_material(name, cell):
 
 def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
     """A material that emits a colour for the attribute `distance`, from 0 to `far`, with a dark line every two cells
-    and the surface itself in white."""
+    and the surface itself in white; by the attribute `slope` lines are as wide where the distance grows slowly."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # before Blender 5.0
         material.use_nodes = True
@@ -59,10 +60,19 @@ def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
         made.location.x = 200 * len(nodes)
         return made
 
-    def math(operation, source, value):
+    def attribute(name):
+        made = node("ShaderNodeAttribute")
+        made.attribute_name = name
+        return made.outputs["Fac"]
+
+    def math(operation, *inputs):
         made = node("ShaderNodeMath")
-        made.operation, made.inputs[1].default_value = operation, value
-        links.new(source, made.inputs[0])
+        made.operation = operation
+        for socket, given in zip(made.inputs, inputs, strict=False):
+            if isinstance(given, bpy.types.NodeSocket):
+                links.new(given, socket)
+            else:
+                socket.default_value = given
         return made.outputs[0]
 
     def painted(colour, over, where):
@@ -72,13 +82,13 @@ def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
         links.new(over, made.inputs[1])
         return made.outputs[0]
 
-    attribute, ramp = node("ShaderNodeAttribute"), node("ShaderNodeValToRGB")
-    attribute.attribute_name = "distance"
-    distance = attribute.outputs["Fac"]
+    distance, slope, ramp = attribute("distance"), attribute("slope"), node("ShaderNodeValToRGB")
     for element, colour in zip(ramp.color_ramp.elements, _NEAR_AND_FAR, strict=True):
         element.color = colour
     links.new(math("DIVIDE", distance, far), ramp.inputs["Fac"])
-    line = math("LESS_THAN", math("FRACT", math("DIVIDE", distance, 2 * cell), 0.0), 0.12)
+    line = math("FRACT", math("ADD", math("DIVIDE", distance, _LINE_EVERY * cell), 0.5))  # 0.5 where a line is
+    off = math("ABSOLUTE", math("SUBTRACT", line, 0.5))
+    line = math("LESS_THAN", off, math("MULTIPLY", math("MINIMUM", slope, 1.0), 0.5 * _LINE_WIDTH / _LINE_EVERY))
     colour = painted(_LINE, over=ramp.outputs["Color"], where=line)
     colour = painted(_SURFACE, over=colour, where=math("LESS_THAN", distance, 0.6 * cell))
     emission, output = node("ShaderNodeEmission"), node("ShaderNodeOutputMaterial")

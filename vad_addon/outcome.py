@@ -10,13 +10,18 @@ import numpy as np
 from ..core import pipeline
 from ..core.cleaning.clean import clean
 from ..core.errors import VADError
+from ..core.field.grid import fit_grid
+from ..core.field.local_surface import fit_local_surface
 from ..core.io.report import report_json
 from ..core.io.vdb import write_vdb
 from ..core.normals.estimate import checked_constraints, estimate_normals
+from ..core.normals.known import known_normals
 from ..core.points import local_spacing, prepare_samples
 from ..core.progress import Progress
 from ..core.settings import Settings
 from ..core.surface.attributes import nearest_samples, residuals
+from ..core.surface.extract import extract_surfaces
+from . import stored_field
 
 CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
 
@@ -30,6 +35,7 @@ class Task:
     until       : the last stage: CLEANING, NORMALS or ALL
     known       : (axes (n,3), confidence (n,)) of an earlier run, which is taken up after its normals, or None
     origin      : (3,) float64, exact in single precision, that results are to be relative to; None: their own centre
+    volume      : .vdb file of the field that is `known` too, or None; :func:`stored_field.suffices` for these settings
     """
 
     points: np.ndarray
@@ -38,6 +44,7 @@ class Task:
     until: str = ALL
     known: tuple[np.ndarray, np.ndarray] | None = None
     origin: np.ndarray | None = None
+    volume: Path | None = None
 
     def save(self, path: Path) -> None:
         arrays = {"points": self.points}
@@ -46,6 +53,8 @@ class Task:
                 arrays |= {f"{name}.{part}": array for part, array in enumerate(pair)}
         if self.origin is not None:
             arrays["origin"] = self.origin
+        if self.volume is not None:
+            arrays["volume"] = str(self.volume)
         np.savez(path, **arrays, settings=json.dumps(asdict(self.settings)), until=self.until)
 
     @classmethod
@@ -54,6 +63,8 @@ class Task:
             arrays = dict(file)
         pairs = {name: (arrays[f"{name}.0"], arrays[f"{name}.1"]) for name in _PAIRS if f"{name}.0" in arrays}
         settings = Settings(**json.loads(str(arrays["settings"])))
+        if "volume" in arrays:
+            pairs["volume"] = Path(str(arrays["volume"]))
         return cls(arrays["points"], settings, until=str(arrays["until"]), origin=arrays.get("origin"), **pairs)
 
 
@@ -62,14 +73,16 @@ _PAIRS = "constraints", "known"
 
 @dataclass(frozen=True)
 class Skin:
-    """A triangle mesh and what its vertices know.
+    """A mesh of quads and triangles and what its vertices know.
 
-    vertices : (v,3) float64 in input units     faces    : (f,3) int32
-    nearest  : (v,) int64, the nearest sample   distance : (v,) float64, how far off, in input units
+    vertices : (v,3) float64 in input units     quads     : (q,4) int32
+    nearest  : (v,) int64, the nearest sample   triangles : (t,3) int32
+    distance : (v,) float64, how far off, in input units
     """
 
     vertices: np.ndarray
-    faces: np.ndarray
+    quads: np.ndarray
+    triangles: np.ndarray
     nearest: np.ndarray
     distance: np.ndarray
 
@@ -86,7 +99,8 @@ class Outcome:
 
     surface  : Skin of the double cover or of the signed surface, or None
     sheet    : Skin of the single layer, or None
-    volume   : .vdb file of the field, relative to `origin`, or None; it belongs to whoever takes the outcome
+    volume   : .vdb file of the field, relative to `origin`, or None; it belongs to whoever takes the outcome, unless it
+               is the task's
     origin   : (3,) float64, centre of the samples, exact in single precision
     cell     : float, spacing of the field's grid
     shape    : nodes of the grid along each axis
@@ -142,7 +156,7 @@ def compute(task: Task, folder: Path, progress=None) -> Outcome:
     Raises :class:`VADError` for what the core refuses and where memory runs out.
     """
     try:
-        run = _reconstructed if task.until == ALL else _begun
+        run = _extracted if task.volume else _reconstructed if task.until == ALL else _begun
         return run(task, folder, Progress.of(progress))
     except MemoryError as error:
         raise VADError("Out of memory: lower the resolution, or give fewer points") from error
@@ -209,8 +223,45 @@ def _reconstructed(task, folder, progress):
     )
 
 
+def _extracted(task, folder, progress):
+    """The surface alone, from the field in the task's volume; the report tells of what was done here only. How far off
+    vertices are is measured on the local surface itself, not interpolated in the grid."""
+    start, settings = time.perf_counter(), task.settings
+    progress.part(0.0, 0.0, "points")(0.0)
+    samples = prepare_samples(task.points)
+    normals, confidence = known_normals(task.known, len(task.points), samples.source_index)
+    grid, spacing = fit_grid(samples.points, settings.resolution), local_spacing(samples.points)
+    values = stored_field.distances(task.volume, grid.shape) / np.float32(samples.scale)
+    part = progress.part(0.0, 0.4, "surface")
+    local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)
+    found = extract_surfaces(values, None, local, grid, settings, lambda x: x, progress.part(0.4, 0.9))
+    skin = None
+    if mesh := found.meshes.get("double"):
+        off = np.linalg.norm(local.project(mesh.vertices, progress.part(0.9, 1.0)).step, axis=1) * samples.scale
+        nearest = local.tree.query(mesh.vertices, workers=-1)[1]
+        skin = Skin(samples.to_input_units(mesh.vertices), mesh.quads, mesh.triangles, nearest, off)
+    seconds = time.perf_counter() - start
+    return Outcome(
+        points=samples.given,
+        source_index=samples.source_index,
+        normals=normals,
+        confidence=confidence,
+        surface=skin,
+        sheet=None,
+        volume=task.volume,
+        origin=task.origin,
+        cell=grid.spacing * samples.scale,
+        shape=grid.shape,
+        report=report_json(
+            {"settings": asdict(settings), "meshes": pipeline.mesh_facts(found), "seconds": {"surface": seconds}}
+        ),
+        warnings=(*samples.warnings, *found.warnings),
+        seconds=seconds,
+    )
+
+
 def _skin(mesh, result):
-    return Skin(mesh.vertices, mesh.faces, nearest_samples(mesh, result), residuals(mesh, result))
+    return Skin(mesh.vertices, mesh.quads, mesh.triangles, nearest_samples(mesh, result), residuals(mesh, result))
 
 
 def centre(points: np.ndarray) -> np.ndarray:

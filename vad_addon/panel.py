@@ -3,8 +3,7 @@
 import bpy
 
 from ..core.settings import options
-from . import extras, job, results, shapes, stages, status
-from .cost import VAD_OT_estimate
+from . import cost, extras, job, results, shapes, stages, status
 from .message import draw_message
 from .operators import VAD_OT_cancel, VAD_OT_reconstruct
 from .points_in import point_count, selection_problem, sources
@@ -40,11 +39,18 @@ class VAD_PT_reconstruct(_Sidebar, bpy.types.Panel):
         extra = ["selected_only"] if any(obj.mode == "EDIT" for obj in objects) else []
         again = results.previous(context.scene, objects[0]) if objects else None
         _settings_column(layout, stored, [*extra, *MAIN_SETTINGS, *(["keep_both"] if again else [])])
-        layout.operator(VAD_OT_reconstruct.bl_idname, icon="OUTLINER_OB_MESH")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator(VAD_OT_reconstruct.bl_idname, icon="OUTLINER_OB_MESH")
         row = layout.row(align=True)
         row.operator(stages.VAD_OT_denoise.bl_idname, icon="SMOOTHCURVE")
         row.operator(stages.VAD_OT_normals.bl_idname, icon="NORMALS_FACE")
-        layout.operator(VAD_OT_estimate.bl_idname, icon="QUESTION")
+        layout.operator(cost.VAD_OT_estimate.bl_idname, icon="QUESTION")
+        if told := cost.lines(context):
+            column = layout.column(align=True)
+            for line in told:
+                draw_message(column, line, "BLANK1")
+            column.operator(cost.VAD_OT_use_resolution.bl_idname, text=f"Use Resolution {cost.suits()}")
 
 
 class VAD_PT_more_settings(_Sidebar, bpy.types.Panel):
@@ -71,7 +77,7 @@ class VAD_PT_last_run(_Sidebar, bpy.types.Panel):
         for line in results.summary(result):
             lines.label(text=line, icon="BLANK1")
         for warning in results.warnings(result):
-            draw_message(self.layout, warning, "ERROR")
+            draw_message(self.layout, warning[:1].upper() + warning[1:], "ERROR")
 
 
 class VAD_PT_look(_Sidebar, bpy.types.Panel):

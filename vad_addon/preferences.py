@@ -6,14 +6,17 @@ from bpy.app.handlers import persistent
 from ..core.errors import VADError
 from ..core.settings import options
 from . import volume_files
+from .message import draw_message
 from .properties import setting_property
+from .requirements import torch_hint
 
-PREFERRED = "resolution", "backend", "memory_limit"  # settings with a default of the user's own
+PREFERRED = "resolution", "backend", "device", "memory_limit"  # settings with a default of the user's own
+_WIDTH = 90  # characters of a line in the preferences
 
 
 class VAD_OT_clear_cache(bpy.types.Operator):
-    """Delete the volumes in the cache folder, where those go that are made before a file is saved. The ones that this
-    file shows stay; for other files that show some, run again"""
+    """Delete the volumes in the cache folder, where they are kept until the file is saved. Those that this file shows
+    stay; another file that was not saved, and is recovered later, loses its own"""
 
     bl_idname = "vad.clear_cache"
     bl_label = "Clear Cache"
@@ -35,12 +38,21 @@ class VAD_preferences(bpy.types.AddonPreferences):
     __annotations__ = {
         name: setting_property(options()[name], update=lambda self, context: prepare_scenes()) for name in PREFERRED
     }
+    __annotations__["cache"] = bpy.props.StringProperty(
+        name="Cache Folder",
+        description="Where volumes are kept until the .blend is saved, which brings them along, in a folder vad_cache. "
+        "Empty: in Blender's folder for extensions",
+        subtype="DIR_PATH",
+    )
 
     def draw(self, context):
         column = self.layout.column(heading="Defaults for scenes in which nothing else was chosen")
         column.use_property_split = True
         for name in PREFERRED:
             column.prop(self, name)
+            if name == "device" and (hint := torch_hint()):
+                draw_message(column, hint, "INFO", _WIDTH)
+        column.prop(self, "cache")
         files, size = volume_files.cache_contents()
         row = self.layout.row()
         row.label(text=f"Cache: {size / 2**20:,.1f} MiB in {files} files", icon="FILE_CACHE")

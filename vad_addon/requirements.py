@@ -1,5 +1,6 @@
 """What Blender itself does not ship."""
 
+import importlib.util
 import sys
 
 
@@ -14,3 +15,13 @@ def scipy_problem() -> str:
             f'carries it, or run "{sys.executable}" -m pip install scipy; then restart Blender'
         )
     return ""
+
+
+def torch_hint() -> str:
+    """What to do to have torch, one line; empty where it is installed."""
+    if importlib.util.find_spec("torch"):
+        return ""
+    return (
+        "Torch is not in Blender's Python, so NumPy stands in, without a GPU. Only the solver energy gains from it. To "
+        f'have it, run "{sys.executable}" -m pip install torch as somebody who may write there; then restart Blender'
+    )

@@ -7,6 +7,7 @@ SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 MESHES = SURFACE, SHEET
 ESTIMATE = "estimate"  # samples with normals alone, made without a run; its SOURCE is its own property
 SOURCE, REPORT, SUMMARY, WARNINGS = "vad_source", "vad_report", "vad_summary", "vad_warnings"  # of a collection
+FIELD_OF = "vad_field_of"  # of a collection: :func:`stored_field.identity` of what its field was made from
 
 SHOWN = (  # what the sidebar shows and hides: role, name, for people
     (SURFACE, "Surface", "the closed mesh"),

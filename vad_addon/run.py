@@ -39,14 +39,19 @@ class Run:
 
     def execute(self, context):
         try:
-            self._compute(context, self._prepared(context))
+            task = self.prepare(context)
+            if self.options.is_repeat and not self.instant(task):
+                self.report({"WARNING"}, f"That takes a while: set it in the tab and press {self.bl_label} there")
+                return {"CANCELLED"}  # Blender brings back what was there
+            self._compute(context, task)
         except VADError as error:
             return self._fail(error)
         return {"FINISHED"}
 
     def invoke(self, context, event):
         try:
-            task = self._prepared(context)
+            task = self.prepare(context)
+            self._live = self.instant(task)
             if bpy.app.background or self._live:
                 self._compute(context, task)
                 return {"FINISHED"}
@@ -93,11 +98,6 @@ class Run:
         for name in type(self).__annotations__:
             self.layout.prop(self, name)
 
-    def _prepared(self, context):
-        task = self.prepare(context)
-        self._live = self.instant(task)
-        return task
-
     def _compute(self, context, task):
         with _exchange_folder() as folder, _cursor(context.window_manager) as progress:
             self.deliver(context, context.scene, outcome.compute(task, folder, progress))
@@ -113,16 +113,30 @@ class Run:
 
     def _end(self, context):
         if job.running() is self._job:
-            job.stop()
+            stop()
         context.window_manager.event_timer_remove(self._timer)
         status.clear()
 
 
 def stop() -> None:
-    """Stop the run under way, if any; its operator notices."""
+    """Stop the run under way, if any; its operator notices. What it leaves is removed when its process is dead."""
     if job.running():
         job.stop()
         status.clear()
+        if not job.clear() and not bpy.app.timers.is_registered(_clear):
+            bpy.app.timers.register(_clear, first_interval=_TICK, persistent=True)
+
+
+def shut_down() -> None:
+    """Stop the run under way, if any, and wait until nothing is left of it."""
+    stop()
+    job.clear(wait=True)
+    if bpy.app.timers.is_registered(_clear):
+        bpy.app.timers.unregister(_clear)
+
+
+def _clear():
+    return None if job.clear() else _TICK
 
 
 @contextmanager

@@ -31,7 +31,7 @@ def cut(collection: bpy.types.Collection, axis: int) -> bpy.types.Object:
     size = np.array(field.data[materials.SIZE])
     obj = _object(f"{field.name} slice", _plane(size, axis), SLICE, collection, field)
     modifier = obj.modifiers.new("Slice", "NODES")
-    modifier.node_group = _slice_nodes(field)
+    modifier.node_group = _slice_nodes(field, axis)
     obj.data.materials.append(materials.iso_lines(obj.name, field.data[materials.CELL], 0.25 * size.max()))
     return obj
 
@@ -95,24 +95,59 @@ def _plane(size, axis):
     return mesh
 
 
-def _slice_nodes(field):
-    """Geometry nodes that store the distance at each vertex: the grid, taken into the plane's space, sampled there."""
+def _slice_nodes(field, axis):
+    """Geometry nodes that store at each vertex of a plane across `axis` the distance, and its slope within the plane,
+    which keeps iso-lines equally wide: the grid, taken into the plane's space, sampled there and half a cell beside."""
     group = bpy.data.node_groups.new("VAD slice", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    kinds = "NodeGroupInput", "GeometryNodeObjectInfo", "GeometryNodeGetNamedGrid", "GeometryNodeSampleGrid"
-    start, volume, grid, sample = (group.nodes.new(kind) for kind in kinds)
-    store, end = group.nodes.new("GeometryNodeStoreNamedAttribute"), group.nodes.new("NodeGroupOutput")
-    for place, node in enumerate((start, volume, grid, sample, store, end)):
-        node.location.x = 200 * place
+
+    def node(kind, column, row=0):
+        made = group.nodes.new(kind)
+        made.location = 200 * column, -200 * row
+        return made
+
+    def vector_math(operation, column, row, *inputs):
+        made = node("ShaderNodeVectorMath", column, row)
+        made.operation = operation
+        for socket, given in zip(made.inputs, inputs, strict=False):
+            if isinstance(given, bpy.types.NodeSocket):
+                group.links.new(given, socket)
+            else:
+                socket.default_value = given
+        return made.outputs
+
+    volume, grid = node("GeometryNodeObjectInfo", 0), node("GeometryNodeGetNamedGrid", 1)
     volume.transform_space = "RELATIVE"
     volume.inputs["Object"].default_value = field
     grid.inputs["Name"].default_value = _distances(field)
-    store.inputs["Name"].default_value = "distance"
-    link = group.links.new
-    link(volume.outputs["Geometry"], grid.inputs["Volume"])
-    link(grid.outputs["Grid"], sample.inputs["Grid"])
-    link(start.outputs["Geometry"], store.inputs["Geometry"])
-    link(sample.outputs["Value"], store.inputs["Value"])
-    link(store.outputs["Geometry"], end.inputs["Geometry"])
+    group.links.new(volume.outputs["Geometry"], grid.inputs["Volume"])
+    place, step = node("GeometryNodeInputPosition", 1, 2).outputs["Position"], 0.5 * field.data[materials.CELL]
+
+    def distance(row, beside=None):
+        sample = node("GeometryNodeSampleGrid", 3, row)
+        group.links.new(grid.outputs["Grid"], sample.inputs["Grid"])
+        if beside is not None:
+            group.links.new(vector_math("ADD", 2, row, place, beside)["Vector"], sample.inputs["Position"])
+        return sample.outputs["Value"]
+
+    here = distance(0)
+    ends = [node("ShaderNodeCombineXYZ", 4, 1), node("ShaderNodeCombineXYZ", 4, 2)]
+    row = 1
+    for name in (name for k, name in enumerate("XYZ") if k != axis):
+        for end, sign in zip(ends, (step, -step), strict=True):
+            group.links.new(distance(row, [sign * (name == other) for other in "XYZ"]), end.inputs[name])
+            row += 1
+    rise = vector_math("SUBTRACT", 5, 1, *(end.outputs["Vector"] for end in ends))["Vector"]
+    rise = vector_math("DIVIDE", 6, 1, rise, [2 * step] * 3)["Vector"]
+    slope = vector_math("LENGTH", 7, 1, rise)["Value"]
+
+    geometry = node("NodeGroupInput", 7).outputs["Geometry"]
+    for column, (name, value) in enumerate({"distance": here, "slope": slope}.items(), start=8):
+        store = node("GeometryNodeStoreNamedAttribute", column)
+        store.inputs["Name"].default_value = name
+        group.links.new(geometry, store.inputs["Geometry"])
+        group.links.new(value, store.inputs["Value"])
+        geometry = store.outputs["Geometry"]
+    group.links.new(geometry, node("NodeGroupOutput", 10).inputs["Geometry"])
     return group

@@ -1,12 +1,13 @@
 """Operators that do one stage of a run alone: cleaned points, normals, or everything after the normals anew."""
 
 import json
+from dataclasses import asdict
 
 import bpy
 import numpy as np
 
 from ..core.settings import options
-from . import attributes, datablocks, extras, overlay, points_in, results, run
+from . import attributes, datablocks, extras, overlay, points_in, results, run, stored_field, volume_files
 from .attributes import Attribute
 from .delivery import OWN, deliver
 from .operators import report_run
@@ -104,7 +105,8 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
 
 
 class VAD_OT_reextract(run.Run, bpy.types.Operator):
-    """Make field and meshes of the last run anew with other settings, from the normals it found"""
+    """Make field and meshes of the last run anew with other settings, from the normals it found. The closed mesh alone
+    is made from the field as it is, in no time, as long as resolution, band and bridge stay"""
 
     bl_idname = "vad.reextract"
     bl_label = "Extract Again"
@@ -112,7 +114,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
 
     __annotations__ = {
         name: setting_property(options()[name], options={"SKIP_SAVE"})
-        for name in ("surface", "bridge", "offset", "resolution")
+        for name in ("surface", "faces", "pieces", "bridge", "offset", "resolution", "band")
     }
 
     @classmethod
@@ -125,6 +127,8 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         return ""
 
     def instant(self, task):
+        if task.volume is not None:
+            return len(task.points) <= 50_000 and task.settings.resolution <= 128
         return len(task.points) <= 20_000 and task.settings.resolution <= 64
 
     def prepare(self, context):
@@ -139,7 +143,12 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         name, uid = (made_from.name, made_from.session_uid) if made_from else (samples.name.removesuffix(" samples"), 0)
         self._source = Source(name, uid, points, attributes.read(samples.data), None)
         self._collection = collection.session_uid
-        return Task(points, settings, known=(axes, confidence), origin=centre)
+        field, volume = results.member(collection, results.FIELD), None
+        same = collection.get(results.FIELD_OF) == stored_field.identity(near, axes, confidence, asdict(settings))
+        if field is not None and same and stored_field.suffices(settings):
+            volume = volume_files.file_of(field.data)
+            volume = volume if volume.is_file() else None
+        return Task(points, settings, known=(axes, confidence), origin=centre, volume=volume)
 
     def deliver(self, context, scene, found):
         of_scene = scene.collection.children_recursive

@@ -11,19 +11,25 @@ from bpy.app.handlers import persistent
 
 from ..core.errors import VADError
 from ..core.io.atomic import atomic_path, writable_folder
+from . import results
 
 PACKAGE = __package__.rpartition(".")[0]
 
 _QUITTING = 20.0  # seconds that Blender may take to quit
+_SUBFOLDER = "vad_cache"  # so that clearing it deletes nothing else
+_STAYS = "The volume stays in the cache folder: "
 _made = set()  # files of this session that may be out of use once its undo history is gone
+_copies = {}  # (file in the cache folder, folder beside a .blend): its copy there
+_before = {}  # the volumes that the save under way brings along, by `session_uid`: what they read before
 
 
-def adopt(name: str, temporary: Path) -> Path:
+def adopt(name: str, temporary: Path, folder: Path | None = None) -> Path:
     """Copy the .vdb `temporary` to where it lasts, as a new file `name`.vdb, whole or not at all, and return its path.
 
+    folder : None for :func:`folder_in_use`
     Raises :class:`VADError` where the folder cannot be written.
     """
-    path = _reserve(name)
+    path = _reserve(name, folder or folder_in_use())
     try:
         with atomic_path(path) as copy:
             shutil.copyfile(temporary, copy)
@@ -36,13 +42,68 @@ def adopt(name: str, temporary: Path) -> Path:
 
 def used() -> set[Path]:
     """The .vdb files that volumes of the open .blend read."""
-    return {Path(bpy.path.abspath(v.filepath, library=v.library)).resolve() for v in bpy.data.volumes}
+    return {file_of(volume) for volume in bpy.data.volumes}
+
+
+def file_of(volume: bpy.types.Volume) -> Path:
+    """The .vdb file that `volume` reads."""
+    return Path(bpy.path.abspath(volume.filepath, library=volume.library)).resolve()
 
 
 @persistent
-def keep_saved(*_) -> None:
-    """After a save: the files that the .blend now reads stay for good."""
+def bring_along(blend: str = "", *_) -> None:
+    """Before the file `blend` is saved (none: the startup file): what its volumes read in the cache folder is copied
+    beside it, and they read the copies from then on. Where that fails they go on reading the cache folder, and the
+    results say so."""
+    _before.clear()
+    if not blend:
+        return
+    folder, caches = Path(blend).resolve().parent / "vad", {cache_folder().resolve(), own_folder().resolve()}
+    here = bpy.data.is_saved and Path(bpy.data.filepath).resolve().parent == folder.parent
+    for volume in bpy.data.volumes:
+        path = file_of(volume)
+        if volume.library is not None or caches.isdisjoint(path.parents) or not path.is_file():
+            continue
+        try:
+            copy = _copy(path, folder)
+        except (VADError, OSError) as error:
+            _warn(volume, f"{_STAYS}{error}")
+            continue
+        _warn(volume, "")
+        _before[volume.session_uid] = volume.filepath
+        volume.filepath = bpy.path.relpath(str(copy)) if here else str(copy)  # Blender makes it relative, if it is to
+
+
+@persistent
+def keep_saved(blend: str = "", *_) -> None:
+    """After a save: the files that the .blend now reads stay for good. Where it was a copy that was saved, what goes on
+    being edited reads what it read before."""
     _made.difference_update(used())
+    if blend != bpy.data.filepath:
+        put_back()
+
+
+@persistent
+def put_back(*_) -> None:
+    """After a save that failed: the volumes read what they read before."""
+    for volume in bpy.data.volumes:
+        if volume.session_uid in _before:
+            volume.filepath = _before[volume.session_uid]
+    _before.clear()
+
+
+def _copy(path, folder):
+    if not _copies.get((path, folder), path / "none").is_file():
+        _copies[path, folder] = adopt(path.stem, path, folder)
+    return _copies[path, folder]
+
+
+def _warn(volume, problem):
+    """Show this problem, and no earlier one, with the results that `volume` belongs to."""
+    for collection in bpy.data.collections:
+        if results.REPORT in collection and any(obj.data == volume for obj in collection.objects):
+            others = [line for line in results.warnings(collection) if not line.startswith(_STAYS)]
+            collection[results.WARNINGS] = "\n".join([*others, *([problem] if problem else [])])
 
 
 @persistent
@@ -75,10 +136,10 @@ def blender_path(path: Path) -> str:
     return bpy.path.relpath(str(path)) if bpy.data.is_saved else str(path)
 
 
-def _reserve(name):
+def _reserve(name, folder):
     """Create an empty file that nobody else uses. Names that exist already are counted up and never reused: an older
     volume, an undone one or another .blend may read them."""
-    folder = writable_folder(folder_in_use())
+    folder = writable_folder(folder)
     stem = bpy.path.clean_name(name)
     path, number = folder / f"{stem}.vdb", 0
     while True:
@@ -97,6 +158,14 @@ def folder_in_use() -> Path:
 
 
 def cache_folder() -> Path:
+    """Where volumes of a .blend that was never saved go: a folder in the one that the user prefers, else
+    :func:`own_folder`."""
+    addon = bpy.context.preferences.addons.get(PACKAGE)
+    preferred = addon.preferences.cache if addon and addon.preferences else ""
+    return Path(bpy.path.abspath(preferred)) / _SUBFOLDER if preferred else own_folder()
+
+
+def own_folder() -> Path:
     """The extension's own folder, which outlives the session; else, when the code runs from a checkout and owns no such
     folder, the session's temporary one."""
     if PACKAGE.startswith("bl_ext."):

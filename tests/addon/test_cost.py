@@ -2,17 +2,21 @@
 
 import re
 
+import numpy as np
 import pytest
 
 
 def test_the_estimate_names_points_resolution_time_and_memory(blender, extension, sphere):
     settings = extension("core.settings").Settings
-    lines = extension("vad_addon.cost").cost_in_words(50 * sphere, settings(resolution=100))
-    assert lines[0] == "500 points"
-    assert float(lines[1].removesuffix(" apart")) == pytest.approx(50 * 0.17, rel=0.1)  # sqrt(4 pi / 500), about
-    suits = int(lines[2].removeprefix("Suits: resolution "))
-    assert suits == pytest.approx(1.25 * 2 / 0.17, rel=0.1)
-    assert re.fullmatch(r"At 100: \d+ s, \d+ MiB", lines[3])
+    dense = np.concatenate([sphere, sphere @ [[0, 1, 0], [0, 0, 1], [1, 0, 0]]])
+    points = extension("vad_addon.cost").Points.of(50 * dense)
+    lines = points.cost(settings(resolution=100))
+    count, apart = re.fullmatch(r"([\d,]+) points, ([\d.]+) apart", lines[0]).groups()
+    assert count == "1,000"
+    assert float(apart) == pytest.approx(50 * 0.112, rel=0.3)  # sqrt(4 pi / 1000), about, less for uneven points
+    assert points.suits() == pytest.approx(1.25 * 2 * 50 / float(apart), rel=0.05)
+    assert lines[1] == f"Suits: resolution {points.suits()}"
+    assert re.fullmatch(r"At 100: [\dhmins ]+, \d+ MiB", lines[2])
 
 
 def test_the_operator_says_it_or_what_is_wrong(blender, add_mesh, sphere, capfd):
@@ -20,8 +24,33 @@ def test_the_operator_says_it_or_what_is_wrong(blender, add_mesh, sphere, capfd)
         blender.ops.vad.estimate()
     scan = add_mesh("Scan", sphere)
     assert blender.ops.vad.estimate() == {"FINISHED"}
-    assert "Info: 500 points; " in capfd.readouterr().out
+    assert "Info: 500 points, 0.1" in capfd.readouterr().out
     scan.select_set(False)
     add_mesh("Few", sphere[:3])
     with pytest.raises(RuntimeError, match="3 distinct finite points"):
         blender.ops.vad.estimate()
+
+
+def test_the_answer_follows_the_settings_and_goes_with_the_points(blender, extension, add_mesh, sphere):
+    cost, stored = extension("vad_addon.cost"), blender.context.scene.vad
+    scan = add_mesh("Scan", sphere)
+    with pytest.raises(RuntimeError, match="Estimate the cost first"):
+        blender.ops.vad.use_resolution()
+    blender.ops.vad.estimate()
+    first = cost.lines(blender.context)
+    assert first[2].startswith("At 128: ")
+    stored.resolution = 64
+    assert cost.lines(blender.context)[2].startswith("At 64: ")
+    stored.band = "wide"
+    assert "band is 'wide'" in cost.lines(blender.context)[0]
+    stored.band = "none"
+    blender.ops.vad.use_resolution()
+    assert f"resolution {stored.resolution}" in first[1]
+    scan.data.vertices.add(1)
+    scan.data.update()
+    blender.context.view_layer.update()
+    assert cost.lines(blender.context) == []
+    blender.ops.vad.estimate()
+    add_mesh("Other", sphere)
+    scan.select_set(False)
+    assert cost.lines(blender.context) == []

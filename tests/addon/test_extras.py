@@ -88,7 +88,14 @@ def test_a_slice_shows_the_distance_where_it_lies(blender, result):
         mesh.attributes["distance"].data.foreach_get("value", distance)
         inside = (np.abs(points) < 1).all(axis=1)
         assert inside.sum() > 1000
-        assert_allclose(distance[inside], np.abs(np.linalg.norm(points[inside], axis=1) - 1), atol=cell)
+        radius = np.linalg.norm(points, axis=1)
+        assert_allclose(distance[inside], np.abs(radius[inside] - 1), atol=cell)
+        slope = np.empty(len(points), np.float32)
+        mesh.attributes["slope"].data.foreach_get("value", slope)
+        normal = np.array(plane.matrix_world)[:3, 2]
+        within = np.sqrt(np.maximum(0, 1 - (points @ normal / np.maximum(radius, 0.1)) ** 2))  # of the plane
+        smooth = inside & (np.abs(radius - 1) > 2 * cell) & (radius > 4 * cell)
+        assert np.abs(slope - within)[smooth].mean() < 0.05
 
 
 def test_normals_become_curves_through_the_samples(blender, result, sphere):

@@ -55,7 +55,7 @@ def test_a_preset_of_ones_own_keeps_every_setting(blender, extension, stored, tm
 
 
 class Preferences:
-    resolution, backend, memory_limit = 200, "numpy", "auto"
+    resolution, backend, device, memory_limit = 200, "numpy", "cpu", "auto"
 
 
 def test_scenes_start_with_what_the_user_prefers(blender, extension, stored, monkeypatch):
@@ -72,9 +72,35 @@ def test_scenes_start_with_what_the_user_prefers(blender, extension, stored, mon
 
     monkeypatch.setattr(preferences.bpy, "context", Context, raising=False)
     preferences.prepare_scenes()
-    assert (stored.resolution, stored.backend) == (200, "numpy")
+    assert (stored.resolution, stored.backend, stored.device) == (200, "numpy", "cpu")
     assert other.vad.resolution == 50
     assert not stored.is_property_set("memory_limit")
+
+
+def test_the_cache_folder_may_be_another(blender, extension, add_mesh, sphere, tmp_path, monkeypatch):
+    files = extension("vad_addon.volume_files")
+
+    class Installed:
+        class preferences:
+            cache = str(tmp_path)
+
+    class Context:
+        class preferences:
+            addons = {files.PACKAGE: Installed}
+
+    with monkeypatch.context() as patched:
+        patched.setattr(files.bpy, "context", Context, raising=False)
+        folder = files.cache_folder()
+    assert folder == tmp_path / "vad_cache"
+    monkeypatch.setattr(files, "cache_folder", lambda: folder)
+    (tmp_path / "mine.vdb").write_text("of somebody else")
+    assert files.cache_contents() == (0, 0)
+    add_mesh("Scan", sphere)
+    for _ in range(2):
+        blender.ops.vad.reconstruct(resolution=16)
+    assert blender.data.volumes["Scan field"].filepath == str(folder / "Scan_001.vdb")
+    blender.ops.vad.clear_cache()
+    assert [path.name for path in tmp_path.rglob("*.vdb")] == ["mine.vdb", "Scan_001.vdb"]
 
 
 def test_clearing_the_cache_spares_what_is_shown(blender, extension, add_mesh, sphere):

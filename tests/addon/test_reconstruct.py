@@ -105,6 +105,18 @@ def test_the_surface_is_a_clean_closed_smooth_mesh(folder, run, scan):
     assert all(polygon.use_smooth for polygon in surface.polygons)
 
 
+def test_quads_where_asked_for(blender, folder, run, scan, extension):
+    surface = run(faces="quads", surface="both")
+    for role in ("surface", "sheet"):
+        mesh = surface[role].data
+        sizes = np.array([len(polygon.vertices) for polygon in mesh.polygons])
+        assert len(sizes) > 500
+        assert (sizes == 4).all()
+        assert not mesh.validate()
+    lines = extension("vad_addon.results").summary(blender.context.scene.vad.result)
+    assert f"{len(sizes):,} quads in the single layer" in lines
+
+
 def test_the_volume_lies_beside_the_saved_file(folder, run, scan):
     volume = run()["field"].data
     assert volume.filepath == "//vad/Scan.vdb"

@@ -21,6 +21,21 @@ def test_registering_twice_leaves_nothing_behind(empty, extension):
         assert shown(empty) == set()
 
 
+def test_every_operator_and_every_choice_says_what_it_does(blender, extension):
+    shown = [cls for cls in extension("vad_addon.interface").CLASSES if not issubclass(cls, blender.types.Panel)]
+    operators = [cls for cls in shown if issubclass(cls, blender.types.Operator)]
+    assert len(operators) > 12
+    for cls in operators:
+        rna = getattr(blender.ops.vad, cls.bl_idname.partition(".")[2]).get_rna_type()
+        assert len(rna.description) > 20, cls
+        for choice in rna.properties:
+            assert choice.description or choice.is_hidden or choice.identifier == "rna_type", (cls, choice)
+    stored = blender.context.scene.vad
+    for group in (stored, stored.overlay):
+        for choice in group.bl_rna.properties:
+            assert choice.description or choice.identifier in {"rna_type", "name", "overlay"}, (group, choice)
+
+
 @pytest.fixture
 def without_scipy(monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "scipy"]:
@@ -106,9 +121,9 @@ def test_the_tab_sums_up_the_last_run_with_its_warnings(blender, extension):
         "Scan VAD",
         "500 samples",
         "1.5 s",
-        "a long tale of things that went",
+        "A long tale of things that went",
         "wrong on the way",
-        "and more",
+        "And more",
     ]
 
 

@@ -130,6 +130,60 @@ def test_extracting_again_gives_what_a_whole_run_gives(blender, scan):
         assert {"distance", "confidence", "number"} <= set(again[role].data.attributes.keys())
 
 
+@pytest.fixture
+def whole_runs(extension, monkeypatch):
+    """List that grows with every run of the whole method."""
+    pipeline, runs = extension("core.pipeline"), []
+    reconstruct = pipeline.reconstruct
+    monkeypatch.setattr(pipeline, "reconstruct", lambda *given, **named: runs.append(1) or reconstruct(*given, **named))
+    return runs
+
+
+def test_the_closed_mesh_comes_from_the_field_as_it_is(blender, folder, scan, whole_runs):
+    blender.ops.vad.reconstruct(resolution=24, offset=0.7)
+    expected = values(by_role(blender)["surface"].data, "position", "vector", 3)
+    distance = values(by_role(blender)["surface"].data, "distance")
+    blender.ops.vad.reconstruct(resolution=24, surface="both")
+    del whole_runs[:]
+    volume, files = blender.data.volumes[0].filepath, set((folder / "vad").iterdir())
+    for _ in range(2):
+        assert blender.ops.vad.reextract(resolution=24, offset=0.7, surface="double") == {"FINISHED"}
+    assert not whole_runs
+    found = values(by_role(blender)["surface"].data, "position", "vector", 3)
+    assert_allclose(found, expected, atol=1e-5)
+    assert 0 < values(by_role(blender)["surface"].data, "distance").mean() < distance.mean()  # nothing interpolated
+    assert set(by_role(blender)) == {"samples", "surface", "field"}
+    assert (blender.data.volumes[0].filepath, set((folder / "vad").iterdir())) == (volume, files)
+    report = json.loads(blender.context.scene.vad.result["vad_report"])
+    assert (report["settings"]["offset"], report["counts"]["samples"]) == (0.7, 499)
+    assert set(report["meshes"]) == {"double"}
+
+
+@pytest.mark.parametrize("other", [dict(bridge=5.0), dict(resolution=20), dict(surface="single"), dict(band="4")])
+def test_another_field_is_made_where_that_one_does_not_do(blender, scan, whole_runs, other):
+    blender.ops.vad.reconstruct(resolution=24)
+    blender.ops.vad.reextract(**{"resolution": 24} | other)
+    assert len(whole_runs) == 2
+    assert by_role(blender)["field"].data.grids.load()
+
+
+def test_another_field_is_made_where_the_samples_or_the_file_changed(blender, folder, scan, whole_runs):
+    blender.ops.vad.reconstruct(resolution=24)
+    samples = by_role(blender)["samples"].data
+    turned = np.roll(values(samples, "normal", "vector", 3), 1, axis=1)
+    samples.attributes["normal"].data.foreach_set("vector", turned.ravel())
+    blender.ops.vad.reextract(resolution=24)
+    assert len(whole_runs) == 2
+    for path in (folder / "vad").iterdir():
+        path.unlink()
+    blender.ops.vad.reextract(resolution=24)
+    assert len(whole_runs) == 3
+    for path in (folder / "vad").iterdir():
+        path.write_text("no volume")
+    with pytest.raises(RuntimeError, match=r"cannot be read \(.*\): reconstruct again"):
+        blender.ops.vad.reextract(resolution=24)
+
+
 def test_extracting_again_searches_no_normals_and_holds_to_edited_ones(blender, scan, extension, monkeypatch):
     blender.ops.vad.reconstruct(resolution=24)
     samples = by_role(blender)["samples"].data
@@ -219,6 +273,7 @@ def test_the_worker_finds_the_same(extension, sphere, tmp_path, until):
         found = running.outcome()
     finally:
         running.stop()
+        running.cleared(wait=True)
     expected = outcome.compute(task, tmp_path)
     for name in ("points", "source_index", "normals", "confidence", "origin", "cell", "shape"):
         assert_array_equal(getattr(found, name), getattr(expected, name))

@@ -80,6 +80,74 @@ def test_files_of_other_sessions_are_never_touched(blender, run, folder, files):
     assert names(folder) == ["Scan.vdb"]
 
 
+@pytest.fixture
+def unsaved(blender, files, add_mesh, sphere):
+    """The volume of a run in a file that was never saved."""
+    add_mesh("Scan", sphere)
+    blender.ops.vad.reconstruct(resolution=16)
+    volume = blender.data.volumes["Scan field"]
+    assert Path(volume.filepath).parent == files.cache_folder()
+    return volume
+
+
+def test_a_save_brings_the_volumes_of_an_unsaved_file_along(blender, unsaved, tmp_path):
+    cached = Path(unsaved.filepath)
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    assert (tmp_path / "vad" / "Scan.vdb").read_bytes() == cached.read_bytes()  # undo leads back to it
+    assert unsaved.grids.load()
+    blender.ops.wm.save_mainfile()
+    assert names(tmp_path) == ["Scan.vdb"]
+    (tmp_path / "elsewhere").mkdir()
+    for name in ("scene.blend", "vad"):
+        (tmp_path / name).rename(tmp_path / "elsewhere" / name)
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "elsewhere" / "scene.blend"))
+    assert not cached.exists()
+    assert blender.data.volumes["Scan field"].grids.load()
+
+
+def test_what_undo_brings_back_from_the_cache_comes_along_again(blender, unsaved, tmp_path):
+    cached = unsaved.filepath
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    unsaved.filepath = cached
+    blender.ops.wm.save_mainfile()
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    assert names(tmp_path) == ["Scan.vdb"]
+
+
+def test_a_saved_copy_has_volumes_of_its_own(blender, unsaved, tmp_path):
+    cached = unsaved.filepath
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"), copy=True)
+    assert unsaved.filepath == cached
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "copy.blend"))
+    assert blender.data.volumes["Scan field"].filepath == "//vad/Scan.vdb"
+    assert names(tmp_path) == ["Scan.vdb"]
+
+
+def test_a_volume_that_cannot_be_copied_stays_and_that_is_said(blender, unsaved, tmp_path):
+    cached = unsaved.filepath
+    (tmp_path / "vad").write_text("in the way")
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert Path(blender.path.abspath(unsaved.filepath)).resolve() == Path(cached).resolve()
+    assert unsaved.grids.load()
+    (warning,) = blender.context.scene.vad.result["vad_warnings"].splitlines()
+    assert warning.startswith("The volume stays in the cache folder: ")
+    (tmp_path / "vad").unlink()
+    blender.ops.wm.save_mainfile()
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    assert not blender.context.scene.vad.result["vad_warnings"]
+
+
+def test_a_save_that_fails_changes_nothing(blender, unsaved, tmp_path):
+    cached = unsaved.filepath
+    (tmp_path / "scene.blend").mkdir()
+    with pytest.raises(RuntimeError):
+        blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert unsaved.filepath == cached
+    blender.ops.wm.read_homefile(use_empty=True)
+    assert names(tmp_path) == []
+
+
 END_OF_A_SESSION = """
     import importlib, sys, types
     import bpy

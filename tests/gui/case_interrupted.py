@@ -48,17 +48,15 @@ def case(gui):
     process = yield from start(large, 256)
     assert not bpy.ops.vad.reconstruct.poll(), "a second run would start"
     bpy.ops.vad.cancel()
-    assert process.returncode is not None
-    yield 0.3
     assert not job.running()
+    yield from gui.until(lambda: process.returncode is not None)
     gui.shot("3_cancelled")
 
     # Another file loaded.
     process = yield from start(large, 256)
     bpy.ops.wm.read_homefile()
-    yield 0.5
-    assert process.returncode is not None, "the worker outlived the file"
     assert job.running() is None
+    yield from gui.until(lambda: process.returncode is not None)
     gui.shot("4_file_loaded")
 
     # The extension disabled, and enabled again.

@@ -53,8 +53,9 @@ def case(gui):
         yield from gui.key("ESC")
         yield from gui.until(lambda: not job.running(), 5)
         seconds = time.monotonic() - pressed
-        print(f"Esc in '{stage}': stopped after {seconds:.2f} s", flush=True)
-        assert process.returncode is not None
+        yield from gui.until(lambda process=process: process.returncode is not None)
+        dead = time.monotonic() - pressed
+        print(f"Esc in '{stage}': free after {seconds:.2f} s, the worker gone after {dead:.2f} s", flush=True)
         assert seconds < max(1.0, 20 * usual), seconds
 
     start()

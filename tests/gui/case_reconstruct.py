@@ -5,7 +5,8 @@ import time
 
 import bpy
 
-BUTTON = 105, 143  # "Reconstruct" in the sidebar; in its place is "Cancel" while a run is under way
+COST = 105, 205
+BUTTON = 105, 146  # "Reconstruct" in the sidebar; in its place is "Cancel" while a run is under way
 
 
 def contents():
@@ -29,6 +30,12 @@ def case(gui):
     gui.shot("2_selected")
     before = contents()
 
+    # What it would cost, shown in the tab.
+    yield from gui.click(*COST)
+    yield 0.5
+    gui.shot("2_cost")
+    assert gui.module("vad_addon.cost").lines(bpy.context)[0].startswith("18,000 points")
+
     # Esc stops a run within a second and leaves nothing.
     bpy.context.scene.vad.resolution = 256
     yield from gui.click(*BUTTON)
@@ -38,7 +45,7 @@ def case(gui):
     assert not bpy.ops.vad.reconstruct.poll()
     pressed = time.monotonic()
     yield from gui.key("ESC")
-    yield from gui.until(lambda: not job.running(), 2)
+    yield from gui.until(lambda: not job.running(), 5)
     assert time.monotonic() - pressed < 1.0, time.monotonic() - pressed
     assert contents() == before
     gui.shot("4_escaped")

@@ -1,8 +1,10 @@
 """One stage alone, by real clicks, with the redo panel; and through the worker where there are many points."""
 
+import time
+
 import bpy
 
-CLEAN, NORMALS = (52, 169), (155, 169)  # buttons in the sidebar
+CLEAN, NORMALS = (52, 179), (155, 179)  # buttons in the sidebar
 
 
 def case(gui):
@@ -89,6 +91,32 @@ def case(gui):
     gui.shot("5_single_layer")
     with gui.override():
         assert bpy.ops.vad.reconstruct.poll()  # from the active object, though that is hidden
+
+    # From the field as it is: at once, with a live redo panel, which refuses what would take long.
+    bpy.context.scene.vad.resolution = 128
+    bpy.context.view_layer.objects.active = bpy.data.objects["bust"]
+    with gui.override():
+        bpy.ops.vad.reconstruct("INVOKE_DEFAULT")
+    yield from gui.until(lambda: not job.running())
+    size = len(made["surface"].data.vertices)
+    with gui.override():
+        started = time.monotonic()
+        assert bpy.ops.vad.reextract("INVOKE_DEFAULT", True, offset=0.7) == {"FINISHED"}
+        print(f"from the field as it is: {time.monotonic() - started:.2f} s")
+    assert len(made["surface"].data.vertices) != size
+    size = len(made["surface"].data.vertices)
+    yield 0.3
+    operator = last("VAD_OT_reextract")
+    adjust(operator, offset=1.5)
+    yield 0.3
+    made = {obj["vad_role"]: obj for obj in bpy.context.scene.vad.result.objects}
+    adjusted = len(made["surface"].data.vertices)
+    assert adjusted != size
+    adjust(operator, surface="single")
+    yield 0.3
+    made = {obj["vad_role"]: obj for obj in bpy.context.scene.vad.result.objects}
+    assert len(made["surface"].data.vertices) == adjusted
+    gui.shot("6_adjusted")
 
     # Many points go through the worker, which Esc stops; the redo panel would freeze the window.
     many = [vertex.co.copy() for vertex in bpy.data.objects["bust"].data.vertices] * 4

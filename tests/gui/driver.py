@@ -1,6 +1,6 @@
 """Runs inside a Blender with a window: plays one case, a generator that yields the seconds to wait, and ends Blender.
 
-blender ... --python driver.py -- CASE FOLDER      FOLDER holds vad.zip and bust.ply and takes shots/
+blender ... --python driver.py -- CASE FOLDER      FOLDER holds vad.zip, bust.ply and README.md, and takes shots/
 """
 
 import importlib
@@ -103,7 +103,7 @@ class Gui:
         self.window.event_simulate(type=kind, value="RELEASE", x=x, y=y, ctrl=ctrl)
         yield 0.2
 
-    def until(self, condition, seconds=60):
+    def until(self, condition, seconds=150):
         """Wait until the condition holds; a generator."""
         deadline = time.monotonic() + seconds
         while not condition():
