@@ -36,11 +36,11 @@ zip: $(READY) ## build and validate the Blender extension into dist/
 
 bench: $(PEERS_READY) ## compare with other ways on a few shapes (minutes); CASES=folder brings your own
 	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH)-quick --quick)
-	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)-quick) --peer --save build/results $(ARGS)
+	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)-quick) --peer --surfaces --save build/results $(ARGS)
 
-bench-full: $(PEERS_READY) ## the same on all shapes and samplings, timed three times, into docs/bench.md (hours)
+bench-full: $(PEERS_READY) ## the same on all shapes and samplings into docs/bench.md (an hour); goes on where it ended; MINUTES=n
 	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH))
-	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)) --results --page bench --repeats 3
+	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)) --results --page bench --surfaces --repeats 3 --jobs 2 --keep $(BENCH)-kept $(if $(MINUTES),--minutes $(MINUTES))
 
 clean: ## remove what the other targets made, the environment included
 	rm -rf $(VENV) demo dist build .pytest_cache .ruff_cache .hypothesis

@@ -4,6 +4,7 @@ import argparse
 import json
 import platform
 import sys
+import time
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -14,11 +15,11 @@ from core.io.report import write_report
 from core.settings import options
 
 from .against import peer_tables, verdicts
-from .cases import SAMPLINGS, find_cases, has_sampling
+from .cases import SAMPLINGS, count_points, find_cases, has_sampling
 from .peers import check_open3d, peer_libraries
 from .report import comparison, markdown_tables, read_run, terminal_header, terminal_row
 from .results import write_results
-from .run import run_cases
+from .run import Plan, run_cases, time_cases
 from .status import CASE_FAILED, DONE, exit_status
 
 _LIBRARIES = ("numpy", "scipy", "libigl")
@@ -49,7 +50,11 @@ def _parser():
         "--set", metavar="NAME=VALUE", type=_assignment, nargs="+", default=[], help=f"settings: {', '.join(options())}"
     )
     parser.add_argument("--peer", action="store_true", help="also run the peers (needs open3d, and cgal for one)")
-    parser.add_argument("--repeats", metavar="N", type=_count, default=1, help="time everything so often (default: 1)")
+    parser.add_argument("--repeats", metavar="N", type=_count, default=1, help="runs to take times of (default: 1)")
+    parser.add_argument("--surfaces", action="store_true", help="surfaces, normals and cost alone, not the field")
+    parser.add_argument("--jobs", metavar="N", type=_count, default=1, help="cases at a time (default: 1)")
+    parser.add_argument("--keep", metavar="FOLDER", type=Path, help="keep what is measured; go on from what is there")
+    parser.add_argument("--minutes", metavar="N", type=float, help="begin no case later than this; say what is missing")
     parser.add_argument("--save", metavar="NAME", type=Path, help="write NAME.json and NAME.md")
     parser.add_argument("--compare", metavar="JSON", type=Path, help="say what changed since a saved run")
     parser.add_argument(
@@ -77,15 +82,26 @@ def _count(text):
 
 def _benchmark(given):
     chosen = dict(given.set) | ({} if given.resolution is None else {"resolution": given.resolution})
-    settings = Settings(**chosen)
-    if given.peer or given.results:
+    plan = Plan(
+        Settings(**chosen),
+        peers=given.peer or given.results,
+        field=not given.surfaces,
+        repeats=given.repeats,
+        jobs=given.jobs,
+        keep=given.keep,
+        until=float("inf") if given.minutes is None else time.monotonic() + 60 * given.minutes,
+    )
+    if plan.peers:
         check_open3d()
     if given.results:
         if chosen or given.cases or given.blue_noise or given.save or given.compare:
             raise SettingsError("--results covers all cases at the default settings; drop the other options")
         paths = find_cases(given.folder)
         samplings = [sampling for sampling in SAMPLINGS if any(has_sampling(path, sampling) for path in paths)]
-        runs = {sampling: _run(given, sampling, settings, True) for sampling in samplings}
+        runs = {sampling: _run(paths, sampling, plan) for sampling in samplings}
+        if plan.repeats > 1:
+            timed = [path for path in paths if has_sampling(path, "uniform")]
+            runs["uniform"]["alone"] = dict(time_cases(timed, "uniform", plan))
         print(f"wrote {write_results(runs, given.page or 'results')}")
         return _status(*runs.values())
     if given.page:
@@ -94,7 +110,8 @@ def _benchmark(given):
     earlier = read_run(given.compare) if given.compare else None
     if given.save:
         writable_folder(given.save.parent)
-    run = _run(given, "blue noise" if given.blue_noise else "uniform", settings, given.peer)
+    sampling = "blue noise" if given.blue_noise else "uniform"
+    run = _run(find_cases(given.folder, given.cases), sampling, plan)
     print("".join(f"{line}\n" for line in verdicts(run["cases"])), end="")
     if given.save:
         _save(run, given.save)
@@ -103,10 +120,10 @@ def _benchmark(given):
     return _status(run)
 
 
-def _run(given, sampling, settings, with_peers):
-    """Run the cases that have the sampling, printing as they finish."""
-    found = find_cases(given.folder, given.cases)
-    paths = [path for path in found if has_sampling(path, sampling)]
+def _run(found, sampling, plan):
+    """Run the cases that have the sampling, those of few points first, printing as they finish."""
+    points = {path: count_points(path, sampling) for path in found}
+    paths = sorted((path for path in found if points[path]), key=points.get)
     if not paths:
         raise InputError(f"no case has {sampling} samples; choose the other sampling or other cases")
     for path in found:
@@ -114,17 +131,19 @@ def _run(given, sampling, settings, with_peers):
             print(f"{path.stem} has no {sampling} samples and is left out")
     print(terminal_header(), flush=True)
     cases = []
-    for result in run_cases(paths, sampling, settings, with_peers, given.repeats):
+    for result in run_cases(paths, sampling, plan):
         print(terminal_row(result), flush=True)
         cases.append(result)
-    names = [*_LIBRARIES, *(module.lower() for module in peer_libraries() if with_peers)]
+    names = [*_LIBRARIES, *(module.lower() for module in peer_libraries() if plan.peers)]
     libraries = {name: version(name) for name in names}
     return {
         "sampling": sampling,
-        "settings": asdict(settings),
-        "repeats": given.repeats,
+        "settings": asdict(plan.settings),
+        "repeats": plan.repeats,
+        "jobs": plan.jobs,
+        "field": plan.field,
         "versions": {"python": platform.python_version(), **libraries},
-        "cases": cases,
+        "cases": sorted(cases, key=lambda result: [path.stem for path in found].index(result["case"])),
     }
 
 

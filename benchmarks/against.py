@@ -1,7 +1,9 @@
 """Us against the peers, case by case, and what that adds up to."""
 
+import statistics
 from collections.abc import Iterator
 
+from .alone import WITHIN
 from .cases import SPOILED
 from .peers import PEERS
 from .report import ABSENT
@@ -79,6 +81,38 @@ def peer_tables(results: list[dict], level: int = 2) -> str:
     said = "\n".join(f"- {line}" for line in verdicts(results))
     parts = [f"{'#' * level} Against the peers", said, overview(results), full_table(results)]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def alone_section(found: dict[str, dict]) -> str:
+    """Our time beside that of the common route, of all that :func:`time_alone` found, by case; empty where nothing."""
+    times = {case: times for case, times in found.items() if "ratio" in times}
+    if not times:
+        return ""
+    lines = [["case", "VAD, s", "CPU s", "Poisson, s", "CPU s", "clock", "CPU", "load before"], ["---"] + ["---:"] * 7]
+    for case, measured in times.items():
+        spent = [f"{measured[way][key]:.2f}" for way in ("ours", "poisson") for key in ("seconds", "cpu")]
+        ratios = [f"{measured['ratio'][key]:.2f}" for key in ("seconds", "cpu")]
+        lines.append([case, *spent, *ratios, ABSENT if measured["load"] is None else f"{measured['load']:.1f}"])
+    said = "\n".join(f"- {_within(times, key, name)}" for key, name in (("seconds", "By the clock"), ("cpu", "CPU")))
+    return f"""\
+## Time
+
+Our whole run over Open3D's normals, orientation and Poisson on the same points, in turn, with nothing else of this
+bench running: medians. *load*: processes at work on the machine in the minute before, which slow both.
+
+{said}
+
+{_markdown(lines)}
+"""
+
+
+def _within(times, key, name):
+    ratios = [measured["ratio"][key] for measured in times.values()]
+    few, middle = sum(ratio <= WITHIN for ratio in ratios), statistics.median(ratios)
+    return (
+        f"{'**Met**' if few == len(ratios) else '**Missed**'}: {name}: {min(ratios):.2f} to {max(ratios):.2f}, median "
+        f"{middle:.2f}; at most {WITHIN} on {few} of {len(ratios)} cases."
+    )
 
 
 def overview(results: list[dict]) -> str:

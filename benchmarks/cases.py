@@ -55,6 +55,13 @@ def has_sampling(path: Path, sampling: str) -> bool:
         return SAMPLINGS[sampling][0] in arrays
 
 
+def count_points(path: Path, sampling: str) -> int:
+    """How many points the case has in the sampling; 0 where it has none."""
+    name = SAMPLINGS[sampling][0]
+    with _opened(path) as arrays:
+        return len(arrays[name]) if name in arrays else 0
+
+
 def load_case(path: Path, sampling: str = "uniform") -> Case:
     """Read a case with the points of one sampling. Raises :class:`InputError` where the file is no case."""
     points, normals = SAMPLINGS[sampling]

@@ -1,4 +1,4 @@
-"""`python -m benchmarks.gallery`: the pictures of the README and of docs/limits.md, into docs/gallery/.
+"""`python -m benchmarks.gallery`: the pictures of the README, docs/figures.md and docs/limits.md, into docs/gallery/.
 
 Every surface is the double cover at default settings unless the panel says otherwise.
 """
@@ -17,6 +17,7 @@ from .pictures import View, caption, draw_errors, draw_points, draw_surface, err
 from .sampling import blue_noise, pierced, uniform, wires
 from .shapes import bordered, closed, junctions, one_sided
 from .status import DONE, exit_status
+from .steps import cuts, pipeline, rounds
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "gallery"
 _PIXELS = 420
@@ -142,7 +143,16 @@ def _rows():
     return points + np.random.default_rng(0).normal(size=points.shape) * 0.006
 
 
-FIGURES = {"shapes": shapes, "normals": normals, "gaps": gaps, "control": control, "limits": limits}
+FIGURES = {
+    "shapes": shapes,
+    "pipeline": pipeline,
+    "cuts": cuts,
+    "normals": normals,
+    "rounds": rounds,
+    "gaps": gaps,
+    "control": control,
+    "limits": limits,
+}
 
 
 def main(arguments: list[str] | None = None) -> int:

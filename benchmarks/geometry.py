@@ -8,14 +8,27 @@ from core import Mesh
 
 def closest_points(x: np.ndarray, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Distance (m,) from points `x` (m,3) to the nearest triangle, and the nearest point (m,3) on it."""
-    squared, _, foot = igl.point_mesh_squared_distance(x, mesh.vertices, mesh.faces.astype(np.int64))
+    squared, _, foot = _closest(x, mesh)
     return np.sqrt(squared), foot
 
 
 def closest_faces(x: np.ndarray, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Distance (m,) from points `x` (m,3) to the nearest triangle, and its index (m,)."""
-    squared, face, _ = igl.point_mesh_squared_distance(x, mesh.vertices, mesh.faces.astype(np.int64))
+    squared, face, _ = _closest(x, mesh)
     return np.sqrt(squared), face
+
+
+_trees = []  # (mesh, faces, tree) of the last two asked for: building the truth's anew each time would show
+
+
+def _closest(x, mesh):
+    """Squared distance, triangle and nearest point, by libigl's tree."""
+    known = next((entry for entry in _trees if entry[0] is mesh), None)
+    if known is None:
+        known = mesh, mesh.faces.astype(np.int64), igl.AABB()
+        known[2].init(mesh.vertices, known[1])
+    _trees[:] = [known, *(entry for entry in _trees if entry is not known)][:2]
+    return known[2].squared_distance(mesh.vertices, known[1], x)
 
 
 def surface_points(mesh: Mesh, count: int, rng: np.random.Generator) -> np.ndarray:

@@ -6,55 +6,60 @@ from core.memory import peak_memory_mb
 
 from .cases import load_case
 from .metrics import surface_errors
-from .peers import PEERS, Clock
+from .peers import PEERS, median_clock, timed
 
 _TRIAL_SAMPLES = 10_000  # a side, to choose a variant by
+_FAILURES = (RuntimeError, ValueError)
 
 
 def measure_peers(names: list[str], path: Path, sampling: str, repeats: int) -> dict[str, dict]:
-    """:func:`_measure` of peers that start alike, by name; one that fails has only the key `error`."""
-    case = load_case(path, sampling)
+    """Errors, time and memory of peers that start alike, by name; one that fails has only the key `error`.
+
+    Of a peer's variants the one with the lowest CD counts, chosen with the truth at hand.
+
+    seconds, cpu : the preparation plus the rest with that variant, either of median time
+    memory_mb    : what the preparation and all variants of all of these peers added to the memory of the process
+    variant      : the parameter chosen, None where there is none
+    """
+    case, prepare = load_case(path, sampling), PEERS[names[0]].prepare
     before = peak_memory_mb()
-    prepare = PEERS[names[0]].prepare
-    start = _timed(prepare, case.points)
-    again = [_timed(prepare, case.points) for _ in range(repeats - 1)]
+    prepared, preparing = timed(prepare, case.points)
+    trials = {name: _tried(PEERS[name], prepared) for name in names}
+    memory = peak_memory_mb() - before
+    preparing = median_clock(preparing, lambda: prepare(case.points), repeats)
     measured = {}
-    for name in names:
+    for name, tried in trials.items():
         try:
-            measured[name] = _measure(PEERS[name], case, [start, *again], before)
-        except (RuntimeError, ValueError) as error:
+            variant, mesh, clock = _best(tried, case.truth)
+        except _FAILURES as error:
             measured[name] = {"error": f"{type(error).__name__}: {error}"}
+            continue
+        clock = median_clock(clock, lambda: PEERS[name].finish(prepared, variant), repeats)  # noqa: B023 - called here
+        measured[name] = {
+            **surface_errors(mesh, case.truth),
+            "variant": variant,
+            "seconds": preparing.seconds + clock.seconds,
+            "cpu": preparing.cpu + clock.cpu,
+            "memory_mb": memory,
+        }
     return measured
 
 
-def _measure(peer, case, starts, before):
-    """Errors, time and memory of a peer; of its variants the one with the lowest CD, chosen with the truth at hand.
+def _tried(peer, prepared):
+    """(variant, mesh, clock) of every variant, or the error that one of them ended with."""
+    try:
+        return [(variant, *timed(peer.finish, prepared, variant)) for variant in peer.variants]
+    except _FAILURES as error:
+        return error
 
-    seconds, cpu : of the run of median time with that variant, preparation included
-    memory_mb    : what the preparations and all variants added to the memory of the process
-    variant      : the parameter chosen, None where there is none
-    """
-    trials = [(variant, *_timed(peer.finish, starts[0][0], variant)) for variant in peer.variants]
-    memory = peak_memory_mb() - before
-    trials = [trial for trial in trials if len(trial[1].faces)]
-    if not trials:
+
+def _best(tried, truth):
+    """The one of `tried` with the lowest CD. Raises what :func:`_tried` met, or ValueError where there is no mesh."""
+    if isinstance(tried, Exception):
+        raise tried
+    made = [trial for trial in tried if len(trial[1].faces)]
+    if not made:
         raise ValueError("it made no triangle")
-    if len(trials) > 1:
-        trials.sort(key=lambda trial: surface_errors(trial[1], case.truth, count=_TRIAL_SAMPLES)["cd"])
-    variant, mesh, finishing = trials[0]
-    finishes = [finishing, *(_timed(peer.finish, prepared, variant)[1] for prepared, _ in starts[1:])]
-    times = sorted((s.seconds + f.seconds, s.cpu + f.cpu) for (_, s), f in zip(starts, finishes, strict=True))
-    seconds, cpu = times[(len(times) - 1) // 2]
-    return {
-        **surface_errors(mesh, case.truth),
-        "variant": variant,
-        "seconds": seconds,
-        "cpu": cpu,
-        "memory_mb": memory,
-    }
-
-
-def _timed(function, *arguments):
-    with Clock() as clock:
-        result = function(*arguments)
-    return result, clock
+    if len(made) == 1:
+        return made[0]
+    return min(made, key=lambda trial: surface_errors(trial[1], truth, count=_TRIAL_SAMPLES)["cd"])

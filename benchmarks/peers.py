@@ -10,6 +10,7 @@ from scipy.spatial import Delaunay, KDTree
 
 from core import Mesh, MissingDependency
 
+SHORT = 2.0  # seconds of CPU time: what takes less is worth repeating to time it
 _PCA_NEIGHBOURS, _ORIENTATION_NEIGHBOURS, _DEPTH = 30, 15, 8
 
 
@@ -22,6 +23,21 @@ class Clock:
 
     def __exit__(self, *_):
         self.seconds, self.cpu = time.perf_counter() - self._start[0], time.process_time() - self._start[1]
+
+
+def timed(function: Callable, *arguments) -> tuple:
+    """What function(*arguments) returns, and the :class:`Clock` of it."""
+    with Clock() as clock:
+        result = function(*arguments)
+    return result, clock
+
+
+def median_clock(first: Clock, function: Callable, repeats: int) -> Clock:
+    """Of the first run of the function and `repeats` - 1 more, the one of the median CPU time, the lower of two; just
+    the first where that took SHORT seconds of it or more."""
+    more = range(repeats - 1) if first.cpu < SHORT else ()
+    clocks = [first, *(timed(function)[1] for _ in more)]
+    return sorted(clocks, key=lambda clock: clock.cpu)[(len(clocks) - 1) // 2]
 
 
 def delaunay_seconds(points: np.ndarray) -> float:

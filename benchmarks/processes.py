@@ -1,15 +1,32 @@
 """Work in processes of its own: its memory is its own, and what crashes or takes too long there ends there."""
 
+import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from multiprocessing import get_context
 
 _WARM = "forkserver" if sys.platform != "win32" else "spawn"
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 _LOADED_ONCE = ["open3d", "benchmarks.measure_peers"]
 
 
 class Failed(Exception):
     """What went wrong in the other process, in one line."""
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Libraries of processes begun meanwhile use one thread of OpenMP and BLAS each, as fits several at a time."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
 
 
 def run_fresh(function: Callable, *arguments):

@@ -219,7 +219,8 @@ def _change(column, old, new):
 def _value(result, path):
     first, *rest = path.split(".")
     if first == "share" and "seconds" in result:
-        return result["seconds"][rest[0]] / result["seconds"]["total"]
+        stages = {stage: spent for stage, spent in result["seconds"].items() if stage not in ("total", "cpu")}
+        return stages[rest[0]] / sum(stages.values())
     for key in (first, *rest):
         result = result.get(key) if isinstance(result, dict) else None
     return result

@@ -1,81 +1,175 @@
-"""One case in, one dict of numbers out; many cases, each in a process of its own."""
+"""One case in, one dict of numbers out; many cases, some at a time, each part in a process of its own."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from functools import partial
+from hashlib import sha256
 from pathlib import Path
+from threading import Event
 
 from core import Settings, reconstruct
 from core.memory import peak_memory_mb
 from core.surface.quality import triangle_quality
 
-from . import peers
+from . import kept
 from .against import best_peer
-from .cases import load_case
+from .alone import FEWEST, MOST, time_alone
+from .cases import count_points, load_case
 from .field_metrics import field_errors, past_rims
 from .measure_peers import measure_peers
 from .metrics import cover_euler, normal_agreement, surface_errors, topology
-from .processes import Failed, run_fresh, run_warm
+from .peers import PEERS, delaunay_seconds, median_clock, timed
+from .processes import Failed, one_thread_each, run_fresh, run_warm
+from .repeatability import differences
 
 PEER_LIMIT = 600.0  # seconds, all variants together
+TWICE_UP_TO = 3_000  # points of a case that is measured twice where times are repeated
+_MISSING = "not measured"
 
 
-def run_cases(
-    paths: list[Path], sampling: str, settings: Settings, with_peers: bool, repeats: int = 1
-) -> Iterator[dict]:
-    """Results case by case. We and the peers run in processes of our own; one that fails yields its name and the
-    error."""
+@dataclass(frozen=True)
+class Plan:
+    """How cases are measured.
+
+    settings : of our runs
+    peers    : whether the peers run, too
+    field    : whether the field is measured, beside the one of the paper's Poisson equation
+    repeats  : times that whatever takes little is run, for the median; with more than one, cases of up to TWICE_UP_TO
+               points are measured twice as a whole
+    jobs     : cases measured at a time
+    keep     : folder for each part of what is measured, from where a later run goes on; None for none
+    until    : time.monotonic() after which no case is begun
+    """
+
+    settings: Settings
+    peers: bool = False
+    field: bool = True
+    repeats: int = 1
+    jobs: int = 1
+    keep: Path | None = None
+    until: float = float("inf")
+
+
+def run_cases(paths: list[Path], sampling: str, plan: Plan) -> Iterator[dict]:
+    """Results case by case, in order. A case that fails, or is not begun in time, yields its name and `error`."""
+    stop = Event()
+    with one_thread_each() if plan.jobs > 1 else nullcontext(), ThreadPoolExecutor(plan.jobs) as pool:
+        try:
+            yield from pool.map(lambda path: _result(_Parts(path, sampling, plan, stop)), paths)
+        finally:
+            stop.set()
+
+
+def time_cases(paths: list[Path], sampling: str, plan: Plan) -> Iterator[tuple[str, dict]]:
+    """Names of the cases with about 10,000 points, and what :func:`time_alone` finds of each."""
     for path in paths:
-        try:
-            result = run_fresh(run_case, path, sampling, settings, repeats)
-        except Failed as error:
-            yield {"case": path.stem, "error": str(error)}
-            continue
-        if with_peers:
-            result["peers"] = run_peers(path, sampling, repeats)
-            result["ratio"] = _ratios(result)
-            if best := best_peer(result):
-                result["best_peer"] = {"name": best, "cd": result["peers"][best]["cd"]}
-        yield result
+        if FEWEST <= count_points(path, sampling) <= MOST:
+            parts, given = _Parts(path, sampling, plan, Event()), (path, sampling, plan.settings, plan.repeats)
+            try:
+                yield path.stem, parts.measure("alone", kept.OURS, partial(run_fresh, time_alone, *given))
+            except Failed as error:
+                yield path.stem, {"error": str(error)}
+            except TimeoutError:
+                return
 
 
-def run_peers(path: Path, sampling: str, repeats: int = 1) -> dict[str, dict]:
-    """What :func:`measure_peers` finds of all that are installed, by name; one that fails has only the key `error`."""
-    groups, measured = {}, {}
-    for name, peer in peers.PEERS.items():
-        if peer.available:
-            groups.setdefault(peer.prepare, []).append(name)
-    for names in groups.values():
-        try:
-            measured |= run_warm(measure_peers, names, path, sampling, repeats, limit=PEER_LIMIT)
-        except Failed as error:
-            measured |= {name: {"error": str(error)} for name in names}
-    return measured
+def missing(results: list[dict]) -> list[str]:
+    """Names of the cases that there was no time for."""
+    return [result["case"] for result in results if result.get("error") == _MISSING]
 
 
-def run_case(path: Path, sampling: str, settings: Settings, repeats: int = 1) -> dict:
+@dataclass(frozen=True)
+class _Parts:
+    """What is measured of a case, part by part; those that were kept are taken as they are."""
+
+    path: Path
+    sampling: str
+    plan: Plan
+    stop: Event
+
+    def measure(self, name: str, sources: tuple[str, ...], run: Callable[[], dict]) -> dict:
+        """Raises :class:`TimeoutError` where time is up, :class:`Failed` where the part fails."""
+
+        def in_time():
+            if self.stop.is_set() or time.monotonic() > self.plan.until:
+                raise TimeoutError
+            return run()
+
+        if self.plan.keep is None:
+            return in_time()
+        file = self.plan.keep / self.sampling.replace(" ", "_") / f"{self.path.stem}.{name}.json"
+        made_of = (
+            f"{self.plan.settings} {self.plan.repeats} {self.plan.field} {sha256(self.path.read_bytes()).hexdigest()}"
+        )
+        return kept.once(file, sources, made_of, in_time)
+
+    def whole(self, suffix: str = "") -> dict:
+        """Ours and the peers'; the suffix tells one round of it from another."""
+        given = self.path, self.sampling, self.plan
+        result = self.measure(f"ours{suffix}", kept.OURS, partial(run_fresh, run_case, *given))
+        if self.plan.peers:
+            result["peers"] = self._peers(suffix)
+        return result
+
+    def _peers(self, suffix):
+        """What :func:`measure_peers` finds of all that are installed, by name; one that fails has only `error`."""
+        groups, measured = {}, {}
+        for name, peer in PEERS.items():
+            if peer.available:
+                groups.setdefault(peer.prepare, []).append(name)
+        for names in groups.values():
+            given = names, self.path, self.sampling, self.plan.repeats
+            run = partial(run_warm, measure_peers, *given, limit=PEER_LIMIT)
+            try:
+                measured |= self.measure(f"{'+'.join(names)}{suffix}", kept.PEERS, run)
+            except Failed as error:
+                measured |= {name: {"error": str(error)} for name in names}
+        return measured
+
+
+def _result(parts):
+    try:
+        result = parts.whole()
+        if parts.plan.repeats > 1 and result["points"] <= TWICE_UP_TO:
+            once = replace(parts, plan=replace(parts.plan, repeats=1))
+            result["again"] = differences(result, once.whole(" again"))
+    except Failed as error:
+        return {"case": parts.path.stem, "error": str(error)}
+    except TimeoutError:
+        return {"case": parts.path.stem, "error": _MISSING}
+    if parts.plan.peers:
+        result["ratio"] = _ratios(result)
+        if best := best_peer(result):
+            result["best_peer"] = {"name": best, "cd": result["peers"][best]["cd"]}
+    return result
+
+
+def run_case(path: Path, sampling: str, plan: Plan) -> dict:
     """Reconstruct one case and measure it against its truth; lengths in the case's own scale, nested by subject."""
-    case = load_case(path, sampling)
+    case, settings = load_case(path, sampling), plan.settings
     before = peak_memory_mb()
-    result, clock = _reconstruct(case, settings)
-    clock, stages = _median([(clock, result), *(_reconstruct(case, settings)[::-1] for _ in range(repeats - 1))])
+    result, first = timed(reconstruct, case.points, settings)
+    clock = median_clock(first, lambda: reconstruct(case.points, settings), plan.repeats)
+    memory = result.report["peak_memory_mb"]
     rows = result.source_index
     measured = {
         "case": case.name,
         "category": case.meta["category"],
         "licence": case.meta["license"],
         "points": len(case.points),
+        "code": kept.code_version(kept.OURS),
         "normals": normal_agreement(result.normals, case.normals[rows], case.points[rows], case.nm_curve),
-        "field": field_errors(result.field, case.truth, result.points),
-        "rims": past_rims(result.field, case.truth),
-        "seconds": {**stages, "total": clock.seconds, "cpu": clock.cpu},
-        "peak_memory_mb": result.report["peak_memory_mb"],
-        "memory_mb": result.report["peak_memory_mb"] - before,
-        "delaunay_seconds": peers.delaunay_seconds(case.points),
+        "seconds": {**result.report["seconds"], "total": clock.seconds, "cpu": clock.cpu},
+        "peak_memory_mb": memory,
+        "memory_mb": memory - before,
         "warnings": result.report["warnings"],
     }
     if result.surface is not None:
         measured["mesh"] = _measure_mesh(result.surface, case)
-    single, clock = _reconstruct(case, replace(settings, surface="single"))
+    single, clock = timed(reconstruct, case.points, replace(settings, surface="single"))
     measured["sheet"] = {
         **surface_errors(single.sheet, case.truth),
         **topology(single.sheet),
@@ -85,22 +179,13 @@ def run_case(path: Path, sampling: str, settings: Settings, repeats: int = 1) ->
         "seconds": clock.seconds,
         "cpu": clock.cpu,
     }
-    poisson = reconstruct(case.points, replace(settings, surface="none", integration="poisson")).field
-    measured["poisson"] = field_errors(poisson, case.truth, result.points)
+    if plan.field:
+        measured["field"] = field_errors(result.field, case.truth, result.points)
+        measured["rims"] = past_rims(result.field, case.truth)
+        measured["delaunay_seconds"] = delaunay_seconds(case.points)
+        poisson = reconstruct(case.points, replace(settings, surface="none", integration="poisson")).field
+        measured["poisson"] = field_errors(poisson, case.truth, result.points)
     return measured
-
-
-def _reconstruct(case, settings):
-    with peers.Clock() as clock:
-        result = reconstruct(case.points, settings)
-    return result, clock
-
-
-def _median(runs):
-    """Clock and seconds per stage of the run of median time, the lower of two."""
-    runs = sorted(runs, key=lambda run: run[0].seconds)
-    clock, result = runs[(len(runs) - 1) // 2]
-    return clock, result.report["seconds"]
 
 
 def _measure_mesh(mesh, case):
@@ -113,8 +198,9 @@ def _measure_mesh(mesh, case):
 
 def _ratios(result):
     """How our times compare: below 1 is faster than the other."""
-    seconds, poisson = result["seconds"], result["peers"].get("poisson", {})
-    ratios = {"normals_to_delaunay": seconds["normals"] / result["delaunay_seconds"]}
+    seconds, poisson, ratios = result["seconds"], result["peers"].get("poisson", {}), {}
+    if "delaunay_seconds" in result:
+        ratios["normals_to_delaunay"] = seconds["normals"] / result["delaunay_seconds"]
     if "seconds" in poisson:
         ratios["total_to_poisson"] = seconds["total"] / poisson["seconds"]
         ratios["cpu_to_poisson"] = seconds["cpu"] / poisson["cpu"]

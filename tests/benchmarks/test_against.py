@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.against import best_peer, full_table, overview, peer_tables, verdicts
+from benchmarks.against import alone_section, best_peer, full_table, overview, peer_tables, verdicts, ways
+from benchmarks.alone import time_alone
 from benchmarks.measure_peers import measure_peers
-from benchmarks.peers import PEERS
-from benchmarks.run import run_peers
-from core import Mesh
+from benchmarks.peers import PEERS, peer_libraries
+from core import Mesh, Settings
 
 
 def measures(cd, **more):
@@ -115,6 +115,28 @@ def _pyramid(points):
     return Mesh(points[[0, 200, 400, 600]], np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]], np.int32))
 
 
-def test_peers_that_are_not_installed_are_left_out(ball, monkeypatch):
+def test_peers_that_are_not_installed_are_left_out(monkeypatch):
     monkeypatch.setattr("benchmarks.peers.find_spec", lambda module: None)
-    assert run_peers(ball, "uniform") == {}
+    assert peer_libraries() == []
+    assert ways().count("(not installed, left out)") == len(PEERS)
+
+
+def timed(ours, others):
+    times = {"ours": {"seconds": ours, "cpu": 2 * ours}, "poisson": {"seconds": others, "cpu": others}}
+    return {**times, "load": 0.5, "ratio": {"seconds": ours / others, "cpu": 2 * ours / others}}
+
+
+def test_times_alone_add_up():
+    text = alone_section({"a": timed(1.0, 1.0), "b": timed(2.8, 2.0), "c": {"error": "broke"}})
+    assert "**Met**: By the clock: 1.00 to 1.40, median 1.20; at most 1.5 on 2 of 2 cases." in text
+    assert "**Missed**: CPU: 2.00 to 2.80, median 2.40; at most 1.5 on 0 of 2 cases." in text
+    assert "| b | 2.80 | 5.60 | 2.00 | 2.00 | 1.40 | 2.80 | 0.5 |" in text
+    assert alone_section({"c": {"error": "broke"}}) == ""
+
+
+def test_both_ways_are_timed_alone(ball):
+    pytest.importorskip("open3d")
+    found = time_alone(ball, "uniform", Settings(resolution=32), 2)
+    assert found["points"] == 800
+    assert all(found[way][key] > 0 for way in ("ours", "poisson") for key in ("seconds", "cpu"))
+    assert found["ratio"]["cpu"] == pytest.approx(found["ours"]["cpu"] / found["poisson"]["cpu"])

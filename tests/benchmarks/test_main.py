@@ -69,8 +69,25 @@ def test_the_page_is_made_of_the_runs(saved, tmp_path, monkeypatch):
     assert text.count("| ball |") == 1 + 2 * 7
     assert "bridge 3.5" in text
     assert "`python -m benchmarks FOLDER --results --page mine --repeats 3`" in text
+    assert "Incomplete" not in text
+    assert "## The same again" not in text
     assert "[blue noise](mine/blue_noise.json)" in text
     assert json.loads((tmp_path / "mine" / "blue_noise.json").read_text()) == run
+
+
+def test_the_page_says_what_is_missing_and_what_came_out_twice(saved, tmp_path, monkeypatch):
+    run = json.loads(saved[0].read_text())
+    monkeypatch.setattr("benchmarks.results.DOCS", tmp_path)
+    (ball,) = run["cases"]
+    twice = {**ball, "case": "twice", "again": {"ours": 0.0, "poisson": 0.006}}
+    run |= {"field": False, "jobs": 2, "cases": [ball, twice, {"case": "late", "error": "not measured"}]}
+    text = write_results({"uniform": run}, "mine").read_text()
+    assert "`python -m benchmarks FOLDER --results --page mine --surfaces --jobs 2`" in text
+    assert "**Incomplete**: 1 of 3 cases with uniform samples are not measured yet (late)." in text
+    assert "| VAD | 1 | 1 | 1 | 0.0% |" in text
+    assert "| Poisson | 1 | 0 | 0 | 0.6% |" in text
+    assert "- **Field**, on" not in text
+    assert f"what measures it: {ball['code']}." in text
 
 
 def test_the_fixture_is_a_case(folder):

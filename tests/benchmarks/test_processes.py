@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from benchmarks.processes import Failed, run_fresh, run_warm
+from benchmarks.processes import Failed, one_thread_each, run_fresh, run_warm
 
 
 def test_results_and_errors_come_back():
@@ -19,3 +19,12 @@ def test_a_crash_and_an_endless_run_end():
         run_warm(os._exit, 3, limit=60)
     with pytest.raises(Failed, match="not done after 1 s"):
         run_warm(time.sleep, 60, limit=1)
+
+
+def test_threads_are_one_meanwhile_and_as_before_after(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    with one_thread_each():
+        assert run_fresh(os.getenv, "OMP_NUM_THREADS") == run_fresh(os.getenv, "OPENBLAS_NUM_THREADS") == "1"
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
