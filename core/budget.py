@@ -16,53 +16,66 @@ FREE_SHARE = 0.7  # of the free memory, where no limit is set
 
 # Measured on runs with default settings over 1,000 to 300,000 samples, resolutions of 64 to 320.
 _MEMORY = {"diagram": 15.0, "sample": 2.2e-3, "field": 130.0, "node": 46e-6}  # MiB
-_SECONDS = {"fixed": 0.3, "sample": 8e-5, "near": 9e-6, "node": 4e-7}  # where the probe takes _PROBE
 
 # The same in a band, at resolutions of 256 and 512: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 110.0, "surface": 1.9e-3, "surface with sides": 3.6e-3}  # MiB
 _BAND_NEAR = 3.4, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
-_BAND_SECONDS = 2e-6  # for a node further out
-_PROBE = 0.006
+
+# Processor seconds where the probe takes _PROBE of them; measured on the runs that docs/noise.md lists, and at 1024.
+_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.05, 8e-5, 3.1e-4
+_NEAR_NODE, _NODE = 2.8e-6, 2.7e-7
+_BAND_NEAR_NODE, _BAND_NODE = 5e-6, 2.4e-6
+_COVER, _SIDES = 1.7e-5, 6.6e-5  # for a squared cell of the surface: its double cover, and one with its sides told
+_PROBE = 0.0112
+_CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 2.9  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Wall seconds on this machine as busy as it is now, and the most memory held at a time, MiB."""
+    """Seconds on this machine as busy as it is now, the most memory held at a time, MiB, and seconds of the processor,
+    all cores together, which other work hardly changes."""
 
     seconds: float
     memory_mb: float
+    cpu_seconds: float
 
 
-def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings()) -> Estimate:
-    """Cost of a run over clean samples with local spacing (n,), in the units of the grid. Of the settings only the
-    resolution, the band and, within a band, the kind of surface count.
+def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False) -> Estimate:
+    """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
+    settings the resolution, the band and the kind of surface count.
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
     """
     cells = spacing / grid.spacing
-    work = _SECONDS["fixed"] + _SECONDS["sample"] * len(spacing)
+    area, sides = float(np.sum(cells**2)), settings.surface in WITH_SIDES
+    work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing)
+    work += area * (_SIDES * sides + _COVER * (settings.surface in ("double", "both")))
     if settings.band is None:
         nodes = float(np.prod(grid.shape))
         near = 2.0 * float(np.sum(cells**2 * (_NEAR + cells)))
-        work += _SECONDS["near"] * near + _SECONDS["node"] * nodes
+        work += _NEAR_NODE * near + _NODE * nodes
         memory = _MEMORY["field"] + _MEMORY["node"] * nodes
     else:
-        area, (width, share) = float(np.sum(cells**2)), _BAND_NEAR
+        width, share = _BAND_NEAR
         near = 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells))))
-        work += _SECONDS["near"] * near + _BAND_SECONDS * 2.0 * area * settings.band
-        kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
-        memory = _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area
-    return Estimate(work * _probe() / _PROBE, max(memory, _diagram(len(spacing))))
+        work += _BAND_NEAR_NODE * near + _BAND_NODE * 2.0 * area * settings.band
+        memory = _BAND_MEMORY["field"] + _BAND_MEMORY["surface with sides" if sides else "surface"] * area
+    probe, busy = _probe()
+    cpu = work * probe / _PROBE
+    return Estimate(_CORES * busy * cpu, max(memory, _diagram(len(spacing))), cpu)
 
 
-def check_budget(estimate: Estimate, samples: int, grid: Grid, settings: Settings) -> None:
-    """Raise :class:`MemoryBudgetError` where the memory estimated is beyond the limit; the message says what fits."""
+def check_budget(estimate: Estimate, samples: int, grid: Grid, settings: Settings) -> tuple[str, ...]:
+    """A warning where the memory estimated is beyond half of the limit; raises :class:`MemoryBudgetError` where it is
+    beyond the limit, with a message that says what fits."""
     limit = settings.memory_limit
     if limit == "auto":
         limit = FREE_SHARE * free_memory_mb()
+    if estimate.memory_mb <= 0.5 * limit:
+        return ()
     if estimate.memory_mb <= limit:
-        return
+        return (f"estimated at {estimate.memory_mb:.0f} MiB, of {limit:.0f} MiB that may be used",)
     least = options()["resolution"].metadata["limits"][0]
     finer = range(settings.resolution - 1, least - 1, -1)
     fitting = (r for r in finer if max(_diagram(samples), _at(r, estimate, grid, settings)) <= limit)
@@ -100,15 +113,16 @@ def _at(resolution, estimate, grid, settings):
 
 
 def _probe():
-    """Seconds that a small fixed piece of the usual work takes here and now; the best of three."""
+    """Processor seconds of a small fixed piece of the usual work, the least of three, and how many times as long the
+    three took by the clock as of the processor, which other work on the machine makes more."""
     points = np.random.default_rng(0).random((4000, 3))
-    took = []
+    begun, took = time.perf_counter(), []
     for _ in range(3):
-        start = time.perf_counter()
-        distance, index = KDTree(points).query(points, k=16, workers=-1)
+        start = time.thread_time()
+        distance, index = KDTree(points).query(points, k=16)
         np.exp(-np.einsum("nki,nki->nk", points[index], points[index]) * distance).sum()
-        took.append(time.perf_counter() - start)
-    return min(took)
+        took.append(time.thread_time() - start)
+    return min(took), max(1.0, (time.perf_counter() - begun) / sum(took))
 
 
 def _linux_available():

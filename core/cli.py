@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 from tqdm import tqdm
 
 from .budget import estimate_cost
+from .cleaning.noise import looks_noisy
 from .errors import Cancelled, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .field.grid import fit_grid
 from .io.atomic import writable_folder
@@ -121,7 +122,7 @@ def _parser():
     text = "say what a scan holds and how large a cell would be"
     command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
     command.add_argument("scan", metavar="SCAN", type=Path, help=formats)
-    _add_settings(command, {name: options()[name] for name in ("resolution", "band")})
+    _add_settings(command, {name: options()[name] for name in ("resolution", "band", "surface")})
     command.add_argument("--json", action="store_true", help="print as JSON")
     command.set_defaults(run=_info)
     return parser
@@ -237,7 +238,7 @@ def _summary(report):
 
 
 def _info(given):
-    settings = Settings(resolution=given.resolution, band=given.band)
+    settings = Settings(resolution=given.resolution, band=given.band, surface=given.surface)
     points = read_points(given.scan)
     samples = prepare_samples(points)
     nearest = KDTree(samples.points).query(samples.points, k=2, workers=-1)[0][:, 1] * samples.scale
@@ -245,7 +246,9 @@ def _info(given):
     finite = int(np.isfinite(points).all(axis=1).sum())
     low, high = used.min(axis=0), used.max(axis=0)
     grid = fit_grid(used, settings.resolution)
-    spacing = local_spacing(samples.points) * samples.scale
+    spacing = local_spacing(samples.points)
+    noisy = looks_noisy(samples.points, spacing)
+    spacing *= samples.scale
     facts = {
         "scan": given.scan,
         "points": len(points),
@@ -257,7 +260,8 @@ def _info(given):
         "resolution": settings.resolution,
         "band": settings.band,
         "grid": {"shape": grid.shape, "cell": grid.spacing},
-        "estimate": asdict(estimate_cost(spacing, grid, settings)),
+        "noisy": noisy,
+        "estimate": asdict(estimate_cost(spacing, grid, settings, noisy)),
     }
     print(report_json(facts) if given.json else _described(facts))
 
@@ -266,6 +270,7 @@ def _described(facts):
     low, high, size = (" ".join(f"{x:.9g}" for x in facts["box"][key]) for key in ("low", "high", "size"))
     smallest, median, largest = (f"{x:.3g}" for x in facts["nearest_neighbour"].values())
     shape = " x ".join(map(str, facts["grid"]["shape"]))
+    cost = facts["estimate"]
     band = "" if facts["band"] is None else f", those within {facts['band']:g} cells of the surface alone"
     return (
         f"points   {facts['points']}, of which {facts['not_finite']} not finite and {facts['duplicates']} duplicates\n"
@@ -273,5 +278,6 @@ def _described(facts):
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"
         f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes{band}\n"
-        f"run      about {facts['estimate']['seconds']:.0f} s and {facts['estimate']['memory_mb']:.0f} MiB"
+        f"run      about {cost['seconds']:.0f} s and {cost['memory_mb']:.0f} MiB; {cost['cpu_seconds']:.0f} s of the "
+        f"processor{', as it looks noisy' if facts['noisy'] else ''}"
     )

@@ -25,6 +25,13 @@ from .surface.extract import Surfaces, band_for, extract_surfaces
 from .surface.pieces import piece_count
 from .surface.quality import quad_quality, triangle_quality
 
+_FACTS = (
+    lambda mesh: {"borders": mesh.border_loops()},
+    lambda mesh: {"pieces": piece_count(mesh)},
+    triangle_quality,
+    quad_quality,
+)
+
 
 def reconstruct(
     points, settings: Settings = Settings(), constraints=None, progress=None, normals=None
@@ -66,8 +73,8 @@ def _reconstruct(points, settings, constraints, normals, progress):
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
         spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
         grid = fit_grid(samples.points, settings.resolution)
-        estimate = estimate_cost(spacing, grid, settings)
-        check_budget(estimate, len(spacing), grid, settings)
+        estimate = estimate_cost(spacing, grid, settings, noisy="noisy" in cleaning)
+        large = check_budget(estimate, len(spacing), grid, settings)
 
     with stages("normals"):
         if normals is None:
@@ -108,7 +115,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "seconds": stages.seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": [*samples.warnings, *ignored, *surfaces.warnings],
+        "warnings": [*samples.warnings, *ignored, *large, *surfaces.warnings],
     }
     progress(1.0)
     return Reconstruction(
@@ -125,18 +132,12 @@ def _reconstruct(points, settings, constraints, normals, progress):
 
 def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
     """What the report tells of each mesh, by kind."""
-    look = Progress.of(progress)
-    facts = {}
-    for kind, mesh in surfaces.meshes.items():
+    facts, progress, kinds = {}, Progress.of(progress), len(surfaces.meshes)
+    for number, (kind, mesh) in enumerate(surfaces.meshes.items()):
         facts[kind] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
         facts[kind] |= {"pieces_dropped": surfaces.dropped[kind]}
-        counted = {"borders": mesh.border_loops, "pieces": partial(piece_count, mesh)}
-        for name, count in counted.items():
-            look(0.0)
-            facts[kind][name] = count()
-        for quality in (triangle_quality, quad_quality):
-            look(0.0)
-            facts[kind] |= quality(mesh)
+        for more in progress.part(number / kinds, (number + 1) / kinds).each(_FACTS):
+            facts[kind] |= more(mesh)
     return facts
 
 

@@ -45,6 +45,12 @@ class Noise:
     neighbours: np.ndarray
 
 
+def looks_noisy(points, spacing, seed: int = 0) -> bool:
+    """Whether samples (n,3) with local spacing (n,) are as far off quadrics as noisy ones are; quick, and less
+    sure than :func:`noisy_samples`, which asks the normals as well."""
+    return len(points) >= MINIMUM_SAMPLES and _roughness(points, spacing, seed, Progress())[0]
+
+
 def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     """(n,) bool: which samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
 
@@ -59,16 +65,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     if len(points) < MINIMUM_SAMPLES:
         return clean
     progress = Progress.of(progress)
-    anchors, region = _anchors(points, seed)
-    fine, wide = (
-        _GAUSS * np.median(fit_quadrics(points, anchors, k, part).left_out()[region], axis=1)
-        for k, part in zip(LADDER, (progress.part(0.0, 0.05), progress.part(0.05, 0.1)), strict=False)
-    )
-    relative = wide / np.median(spacing[anchors][region], axis=1)
-    growth = wide / np.maximum(fine, np.finfo(float).tiny)
-    everywhere, level = np.percentile(relative, (10, 50))
-    whole = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
-    suspect = _rough(relative, growth)
+    whole, suspect, relative, anchors, region = _roughness(points, spacing, seed, progress)
     least = max(_REGION, _SMALLEST_PART * len(anchors))
     if not whole and suspect.sum() < least:
         return clean
@@ -84,6 +81,21 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     suspect &= core[region].any(axis=1)
     noisy = suspect[region[:, :_SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
     return noisy[_nearest(points, points[anchors], progress.part(0.9, 1.0))]
+
+
+def _roughness(points, spacing, seed, progress):
+    """Whether samples look noisy as a whole, which anchors look so (m,), how far these are off, local spacings (m,);
+    the anchors (m,) and their regions (m,k)."""
+    anchors, region = _anchors(points, seed)
+    fine, wide = (
+        _GAUSS * np.median(fit_quadrics(points, anchors, k, part).left_out()[region], axis=1)
+        for k, part in zip(LADDER, (progress.part(0.0, 0.05), progress.part(0.05, 0.1)), strict=False)
+    )
+    relative = wide / np.median(spacing[anchors][region], axis=1)
+    growth = wide / np.maximum(fine, np.finfo(float).tiny)
+    everywhere, level = np.percentile(relative, (10, 50))
+    whole = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
+    return bool(whole), _rough(relative, growth), relative, anchors, region
 
 
 def _rough(relative, growth):

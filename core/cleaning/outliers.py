@@ -1,7 +1,7 @@
 """Stray samples: scattered through space, hovering beside a surface, or in detached clouds.
 
 A sample is never judged by its density alone, which would eat wires, rims and sparsely scanned parts: it must also
-stand off the plane of its neighbours, or lie among samples that form no surface.
+stand off the plane of its neighbours, or lie among samples that form no surface, or off all wires.
 """
 
 import numpy as np
@@ -25,6 +25,9 @@ _THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a 
 _CHUNK = 8192  # samples
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
 _WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
+_ASTRAY, _FEW = 0.01, 5  # share and number of samples off all wires above which they are strays: ends of wires are, too
+_PEERS, _AS_SPARSE, _IN_LINE = 6, 0.5, 3  # nearest samples with this share of a sample's spacing; so many make a line
+_STRAIGHT = 0.98  # least cosine to the direction of a line
 _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
 _DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
@@ -42,6 +45,8 @@ def find_outliers(points, progress=None) -> np.ndarray:
 
     - beside a surface: lonelier than its neighbours and off their plane, or far lonelier;
     - scattered: sparse against the whole cloud, where most sparse samples around form no surface;
+    - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
+      as sparse, which may be a wire sampled less;
     - detached: in a small part of its own that is a cloud rather than a sheet;
     - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
     """
@@ -57,6 +62,9 @@ def find_outliers(points, progress=None) -> np.ndarray:
         found = around.beside(_STRICT if dirty else 1.0) | around.scattered(part.part(0.6, 0.7))
         part(0.7)
         found |= around.detached()
+        off_wires = around.off_wires()
+        if dirty or off_wires.sum() > max(_ASTRAY * len(kept), _FEW):
+            found |= off_wires
         if dirty:
             found |= around.hovering(part.part(0.8, 1.0))
         stray[kept[found]] = True
@@ -79,6 +87,7 @@ class _Surroundings:
         self.points = points
         self.spacing, self.thickness, off_plane, theirs = np.empty((4, n))
         self.neighbours, curve = np.empty((n, _NEIGHBOURS + 1), np.int64), np.empty(n, bool)
+        self.centre, self.along = np.empty((2, n, 3))
         tree = KDTree(points)
         for part in progress.part(0.0, 0.9).chunks(n, _CHUNK):
             distance, self.neighbours[part] = tree.query(points[part], k=_NEIGHBOURS + 1, workers=-1)
@@ -87,6 +96,7 @@ class _Surroundings:
             centre = group.mean(axis=1)
             group = group - centre[:, None]
             squared, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", group, group))
+            self.centre[part], self.along[part] = centre, axes[:, :, 2]
             extent = np.sqrt(np.maximum(squared, 0.0))
             size = np.maximum(np.linalg.norm(extent, axis=1), np.finfo(float).tiny)
             self.thickness[part] = extent[:, 0] / size
@@ -95,6 +105,7 @@ class _Surroundings:
         for part in progress.part(0.9, 1.0).chunks(n, _CHUNK):
             theirs[part] = np.median(self.spacing[self.neighbours[part, 1:]], axis=1)
         theirs = np.maximum(theirs, np.finfo(float).tiny)
+        self.curve = curve
         self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5) | (curve.mean() > _WIREFRAME)
         self.lonely = self.spacing / theirs
         self.off = off_plane / theirs
@@ -116,10 +127,26 @@ class _Surroundings:
             found[sparse[part]] = astray[sparse[around]].mean(axis=1) > _MAJORITY
         return found
 
+    def off_wires(self):
+        found = np.zeros(len(self.points), bool)
+        row = np.flatnonzero(self.wire & (self.lonely > _LONELY))
+        near = self.neighbours[row, 1:]
+        cosine = _cosines(self.points[row, None] - self.centre[near], self.along[near])
+        row = row[~((cosine > _STRAIGHT) & self.curve[near]).any(axis=1)]
+        half_octave = np.floor(2 * np.log2(self.spacing[row])) / 2
+        for power in np.unique(half_octave):
+            own = row[half_octave == power]
+            peers = self.points[self.spacing >= _AS_SPARSE * 2.0**power]
+            nearest = KDTree(peers).query(self.points[own], k=min(_PEERS + 1, len(peers)), workers=-1)[1]
+            step = peers[nearest.reshape(len(own), -1)[:, 1:]] - self.points[own, None]
+            lined = (_cosines(step[:, :, None], step[:, None]) > _STRAIGHT).sum(axis=2) >= _IN_LINE
+            found[own] = ~lined.any(axis=1)
+        return found
+
     def hovering(self, progress):
         height = fit_quadrics(self.points, np.arange(len(self.points)), _FITTED, progress).left_out()
         around = np.median(height[self.neighbours], axis=1)
-        return height > np.maximum(_HOVERING * around, _HOVERING_FAR * self.spacing)
+        return (height > np.maximum(_HOVERING * around, _HOVERING_FAR * self.spacing)) & ~self.wire
 
     def detached(self):
         rows = np.repeat(np.arange(len(self.points)), _NEIGHBOURS)
@@ -131,3 +158,10 @@ class _Surroundings:
         size = np.bincount(part, minlength=count)
         thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
         return (thick & (size < _SMALL_PART * len(self.points)))[part]
+
+
+def _cosines(a, b):
+    """Of the angles between lines along the vectors (...,3) of either; 0 for vectors without a length."""
+    squares = np.einsum("...i,...i->...", a, a) * np.einsum("...i,...i->...", b, b)
+    product = np.abs(np.einsum("...i,...i->...", a, b))
+    return product / np.sqrt(np.maximum(squares, np.finfo(float).tiny))

@@ -60,12 +60,16 @@ class Crossings:
 def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
     """Crossings of the zero set, from the nodes near it."""
     progress, strides, hair = Progress.of(progress), node_strides(grid), _HAIR * grid.spacing
-    meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.5))
+    meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.4))
+    progress(0.4)
     cells, side = _sides(band, grid)
+    progress(0.45)
     edge, vote, place = _vote(cells, side, grid)
+    progress(0.5)
     alone = ~np.isin(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
     edge, vote, place = edge[alone], vote[alone], place[alone]
-    found = surface.project(place, progress.part(0.5, 1.0))
+    found = surface.project(place, progress.part(0.5, 0.9))
+    progress(0.9)
     on = found.distance <= _COVERED * grid.spacing
     edge, place, vote = edge[on], place[on] - found.step[on], vote[on]
     once, twice = _once(meet)
@@ -77,7 +81,9 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     certainty = np.concatenate([np.abs(vote), meet.certainty[once]])
     whole = np.isin(_cells_around(node, axis, strides), cells).all(axis=1)
     node, axis, crossed, certainty = node[whole], axis[whole], crossed[whole], certainty[whole]
+    progress(0.95)
     mend(node, axis, crossed, certainty, strides)
+    progress(0.98)
     twice = twice[np.isin(_cells_around(meet.node[twice], meet.axis[twice], strides), cells).all(axis=1)]
     return Crossings(
         np.concatenate([node[crossed], meet.node[twice]]),

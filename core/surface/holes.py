@@ -4,68 +4,154 @@ Where sheets meet, a border may end at a junction, so a hole beside one is bound
 the other sheet.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..field.local_surface import LocalSurface
+from .fillings import edge_keys, face_keys, fillings
 from .mesh import Mesh
 
-_LONGEST = 32  # edges of a loop that may be closed
-_DETOUR = 1.5  # of the way along the other sheet, relative to the straight one
+_LONGEST = 64  # edges of a loop that may be closed
+_DETOUR, _CORNER = 1.5, 1.0  # of the way along the other sheet, relative to the straight one, and cells more
 _NEAR = 0.5  # cells, the surface is where it is this near
 _UNSEEN = 2.0  # cells, narrower openings are below what the grid shows
+_AROUND = 32  # samples, whose median spacing is that of a place
+_DOUBLED = 0.75  # of a loop's border, where the filling would lie on faces that are there
+_TINY = np.finfo(float).tiny
 
 
 def fill_pinholes(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
-    """Close border loops by a fan of triangles around their middle: those of at most 32 edges that are no wider than
-    the bridging length or than two cells, or whose middle and spokes lie on the surface. Wider openings stay."""
+    """Close border loops of at most 64 edges by triangles between their vertices, where these lie on the surface or
+    need no edge longer than the bridging length or two cells. Wider openings stay, and so do the rims of small sheets,
+    whose filling would double what is there.
+
+    Pieces of border that end at junctions are closed piece by piece first, then those that pass further ones at once.
+    """
+    for again in (False, True):
+        mesh = _filled(mesh, surface, cell, again)
+    return mesh
+
+
+def _filled(mesh, surface, cell, again):
     edges, counts = mesh.edge_counts()
-    loops, paths = _simple_loops(edges[counts == 1])
-    loops += _closed(paths, mesh, edges[counts > 1])
+    border = edges[counts == 1]
+    loops, paths = _simple_loops(border)
+    parted = [_parted(path, edges[counts > 2]) for path in paths]
+    if again:
+        loops, paths = [], [path for path, parts in zip(paths, parted, strict=True) if len(parts) > 1]
+    else:
+        paths = [part for parts in parted for part in parts]
+    loops += _closed([path for path in paths if len(path) <= _LONGEST], mesh, edges[counts > 1], cell)
     loops = [loop for loop in loops if len(loop) <= _LONGEST]
     if not loops:
         return mesh
-    length = np.array([len(loop) for loop in loops])
-    first = np.cumsum(length) - length
-    corner, loop = np.concatenate(loops), np.repeat(np.arange(len(loops)), length)
-    following = np.concatenate([np.roll(loop, -1) for loop in loops])
-    at = mesh.vertices[corner]
-    middle = np.add.reduceat(at, first) / length[:, None]
-    found = surface.project(middle)
-    spokes = surface.project(0.5 * (at + middle[loop])).distance
-    farthest = np.maximum(found.distance, np.maximum.reduceat(spokes, first))
-    width = 2 * np.maximum.reduceat(np.linalg.norm(at - middle[loop], axis=1), first)
-    bridged = surface.bridge * surface.spacing[surface.tree.query(middle, workers=-1)[1]]
-    closed = (width <= np.maximum(bridged, _UNSEEN * cell)) | (farthest <= _NEAR * cell)
-
-    apex = len(mesh.vertices) + np.cumsum(closed) - 1
-    fan = np.stack([corner, following, apex[loop]], axis=1)[closed[loop]]
-    return Mesh(
-        np.concatenate([mesh.vertices, middle[closed] - found.step[closed]]),
-        np.concatenate([mesh.faces, fan]).astype(np.int32),
-        mesh.pairs,
-    )
+    n, at_loop = len(mesh.vertices), np.zeros(len(mesh.vertices), bool)
+    at_loop[np.concatenate(loops)] = True
+    taken = (edge_keys(edges[at_loop[edges].all(axis=1)], n), face_keys(mesh.faces[at_loop[mesh.faces].all(axis=1)], n))
+    triangle, loop = fillings(mesh.vertices, loops, *taken, cell)
+    longest, off = _reach(mesh.vertices, triangle, loop, loops, surface)
+    middle = np.array([mesh.vertices[corners].mean(axis=0) for corners in loops])
+    around = surface.tree.query(middle, k=min(_AROUND, surface.tree.n), workers=-1)[1].reshape(len(loops), -1)
+    bridged = surface.bridge * np.median(surface.spacing[around], axis=1)
+    closed = (longest <= np.maximum(bridged, _UNSEEN * cell)) | (off <= _NEAR * cell)
+    closed &= _doubled(mesh, border, loops) < _DOUBLED
+    if not closed.any():
+        return mesh
+    return replace(mesh, faces=np.concatenate([mesh.faces, triangle[closed[loop]]]).astype(np.int32))
 
 
-def _closed(paths, mesh, edges):
-    """Loops of the paths that the shortest way along `edges` (e,2) closes without a detour."""
-    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
-    length = np.maximum(length, np.finfo(float).tiny)
-    graph = coo_matrix((length, tuple(edges.T)), shape=(len(mesh.vertices),) * 2).tocsr()
+def _reach(vertices, triangle, loop, loops, surface):
+    """The longest edge inside each loop's filling, and how far off the surface the filling is, (loops,) each."""
+    n, corners = len(vertices), vertices[triangle]
+    rims = edge_keys(np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in loops]), n)
+    longest, off = np.zeros(len(loops)), np.zeros(len(loops))
+    np.maximum.at(off, loop, surface.project(corners.mean(axis=1)).distance)
+    for k in range(3):
+        inner = ~np.isin(edge_keys(triangle[:, [k, k - 1]], n), rims)
+        a, b = corners[inner, k], corners[inner, k - 1]
+        np.maximum.at(longest, loop[inner], np.linalg.norm(a - b, axis=1))
+        np.maximum.at(off, loop[inner], surface.project(0.5 * (a + b)).distance)
+    return longest, off
+
+
+def _doubled(mesh, border, loops):
+    """How far the faces at each loop's border lie on the side of its filling, (loops,) in [-1,1]: -1 around a hole, 1
+    at the rim of a small flat sheet."""
+    n, at_border = len(mesh.vertices), np.zeros(len(mesh.vertices), bool)
+    at_border[border] = True
+    ends, beyond = _sides(mesh.faces[at_border[mesh.faces].sum(axis=1) > 1])
+    key = edge_keys(ends, n)
+    own = np.flatnonzero(np.isin(key, edge_keys(border, n)))
+    own = own[np.argsort(key[own])]
+    key, beyond = key[own], mesh.vertices[beyond[own]]
+    share = np.empty(len(loops))
+    for number, loop in enumerate(loops):
+        tail, head = mesh.vertices[loop], mesh.vertices[np.roll(loop, -1)]
+        wanted = edge_keys(np.stack([loop, np.roll(loop, -1)], axis=1), n)
+        row = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+        length = np.linalg.norm(head - tail, axis=1) * (key[row] == wanted)
+        axis = _unit(np.cross(tail - tail[0], head - tail[0]).sum(axis=0))
+        share[number] = length @ _unit(np.cross(head - tail, beyond[row] - tail)) @ axis / max(length.sum(), _TINY)
+    return share
+
+
+def _unit(vectors):
+    """Vectors (...,3) made unit, zero where they are."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
+
+
+def _sides(faces):
+    """The sides of triangles (f,3), (3f,2), and the corner across from each, (3f,)."""
+    return np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), faces[:, [2, 0, 1]].T.reshape(-1)
+
+
+def _parted(path, edges):
+    """The pieces of a path between the vertices of `edges` (e,2) that it passes."""
+    cut = np.flatnonzero(np.isin(path[1:-1], edges)) + 1
+    return [path[a : b + 1] for a, b in zip([0, *cut], [*cut, len(path) - 1], strict=True)]
+
+
+def _closed(paths, mesh, edges, cell):
+    """Loops of the paths that the shortest way along `edges` (e,2) closes without a detour; rather past the faces at
+    the path itself than along them."""
+    if not paths:
+        return []
+    n, ways = len(mesh.vertices), np.concatenate([edges, edges[:, ::-1]])
+    length = np.linalg.norm(np.diff(mesh.vertices[ways], axis=1)[:, 0], axis=1)
+    graph = coo_matrix((np.maximum(length, _TINY), tuple(ways.T)), shape=(n, n)).tocsr()
+    steps = [edge_keys(np.stack([path[:-1], path[1:]], axis=1), n) for path in paths]
+    at_path = np.zeros(n, bool)
+    at_path[np.concatenate(paths)] = True
+    ends, beyond = _sides(mesh.faces[at_path[mesh.faces].sum(axis=1) > 1])
+    beside = dict(zip(edge_keys(ends, n).tolist(), beyond.tolist(), strict=True))
     loops = []
-    for path in paths:
-        if not 3 <= len(path) <= _LONGEST:
-            continue
-        start, end = path[0], path[-1]
-        farthest = _DETOUR * np.linalg.norm(mesh.vertices[start] - mesh.vertices[end])
-        reached, before = dijkstra(graph, directed=False, indices=start, limit=farthest, return_predecessors=True)
-        way = [end]
-        while np.isfinite(reached[end]) and before[way[-1]] != start:
-            way.append(before[way[-1]])
-        if np.isfinite(reached[end]) and not set(way[1:]) & set(path):
-            loops.append(np.array([*path, *way[1:]]))
+    for path, step in zip(paths, steps, strict=True):
+        farthest = _DETOUR * np.linalg.norm(mesh.vertices[path[0]] - mesh.vertices[path[-1]]) + _CORNER * cell
+        own = [corner for corner in (beside[k] for k in step.tolist()) if corner not in (path[0], path[-1])]
+        for avoided in ([*path[1:-1], *own], path[1:-1]):
+            way = _way(graph, path[0], path[-1], avoided, farthest)
+            if way is not None:
+                loops.append(np.array([*path, *way]))
+                break
     return loops
+
+
+def _way(graph, start, end, avoided, farthest):
+    """The vertices between two on the shortest way back from `end` that passes none of those avoided; None where it is
+    too far."""
+    passed = np.concatenate([np.empty(0, int), *(np.arange(*graph.indptr[v : v + 2]) for v in avoided)])
+    kept, graph.data[passed] = graph.data[passed], np.inf
+    reached, before = dijkstra(graph, indices=start, limit=farthest, return_predecessors=True)
+    graph.data[passed] = kept
+    if not np.isfinite(reached[end]):
+        return None
+    way = [end]
+    while before[way[-1]] != start:
+        way.append(before[way[-1]])
+    return way[1:]
 
 
 def _simple_loops(edges) -> tuple[list[np.ndarray], list[np.ndarray]]:

@@ -21,6 +21,7 @@ _GAP, _STEP, _FAR = (
     1.5,
     2.0,
 )  # local spacings to the last sample and to the place, cells; gaps closed before a sheet
+_CHUNK = 1 << 17  # nodes
 _STRAIGHT = 0.7  # cosine between the way out of the sheet and the way to the other
 
 
@@ -47,14 +48,14 @@ def meeting_edges(node, step, surface: LocalSurface, grid: Grid, strides, hair, 
     sample is where sheets meet; `hair` (3,) decides the side of nodes that lie on a sheet."""
     progress, cell = Progress.of(progress), grid.spacing
     node = node[np.einsum("bi,bi->b", step, step) <= (_NEAR * cell) ** 2]
-    node = node[meetings(surface, progress.part(0.0, 0.2))[surface.tree.query(grid.positions(node), workers=-1)[1]]]
+    node = node[_at_meetings(grid.positions(node), surface, progress)]
     if not len(node):
         none, nowhere = np.empty(0, np.int64), np.empty((0, 3))
         return MeetingEdges(none, none, nowhere, nowhere, np.empty(0, bool), np.empty(0), none)
     x = grid.positions(node)
     ahead = [_rows(node, node + stride) for stride in strides]
     back = [_rows(node, node - stride) for stride in strides]
-    sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.2, 0.9))
+    sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.3, 0.9))
     found = [_along(axis, ahead[axis], sheets, x, cell, hair) for axis in range(3)]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
     one, place, normal, crossed, certainty, beyond, near = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -63,6 +64,14 @@ def meeting_edges(node, step, surface: LocalSurface, grid: Grid, strides, hair, 
     return MeetingEdges(
         node[one[kept]], axis[kept], place[kept], normal[kept], crossed[kept], certainty[kept], np.sort(zone)
     )
+
+
+def _at_meetings(x, surface, progress):
+    """Whether the samples nearest to positions (m,3) are where sheets meet, (m,) bool."""
+    meet, found = meetings(surface, progress.part(0.0, 0.2)), np.zeros(len(x), bool)
+    for part in progress.part(0.2, 0.3).chunks(len(x) if meet.any() else 0, _CHUNK):
+        found[part] = meet[surface.tree.query(x[part], workers=-1)[1]]
+    return found
 
 
 def _rows(node, wanted):
@@ -82,7 +91,7 @@ def _along(axis, ahead, sheets, x, cell, hair):
             tail.append(first[edge] + i)
             head.append(first[ahead[edge]] + j)
     tail, head = np.concatenate(tail), np.concatenate(head)
-    alike, off = one_sheet(sheets[tail], sheets[head], cell)
+    alike, off = one_sheet(sheets, tail, head, cell)
     tail, head, off = tail[alike], head[alike], off[alike]
     mutual = _least(tail, off) & _least(head, off)
     tail, head = tail[mutual], head[mutual]

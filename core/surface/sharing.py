@@ -1,7 +1,7 @@
 """Which crossings of a cell share a vertex.
 
 Sheets that cross or end at each other share the vertices of the cells where they do. Sheets that run side by side
-within a cell have one each, unless one of them ends there.
+within a cell have one each, also where one of them ends.
 """
 
 import numpy as np
@@ -43,6 +43,7 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
 
     open_cell = np.zeros(len(cell), bool)
     open_cell[corner[_at_end(vertex, corner, cell, crossings, owner, grid)]] = True
+    open_cell &= steep
     leader = np.full(len(cell), len(corner))
     np.minimum.at(leader, corner, vertex)
     vertex = np.where(open_cell[corner], leader[corner], vertex)

@@ -77,11 +77,11 @@ def sheets_near(
     return sheets
 
 
-def one_sheet(a: Sheets, b: Sheets, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Whether pairs of `a` and of `b`, row by row, lie on one sheet, (p,) bool, and how far off they are, (p,)."""
-    cosine = np.abs(np.einsum("pi,pi->p", a.axis, b.axis))
-    gap = a.foot - b.foot
-    off = np.maximum(np.abs(np.einsum("pi,pi->p", gap, a.axis)), np.abs(np.einsum("pi,pi->p", gap, b.axis)))
+def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Whether the pairs of rows a and b, (p,) each, lie on one sheet, (p,) bool, and how far off they are, (p,)."""
+    axes, gap = (sheets.axis[a], sheets.axis[b]), sheets.foot[a] - sheets.foot[b]
+    cosine = np.abs(np.einsum("pi,pi->p", *axes))
+    off = np.maximum(*(np.abs(np.einsum("pi,pi->p", gap, axis)) for axis in axes))
     limit = _BENT * np.linalg.norm(gap, axis=1) + _OFF * cell
     return (cosine > ALIKE) & (off <= limit), off / cell + 1 - cosine
 
@@ -134,7 +134,7 @@ def _told(sheets, surface, x, towards, cell):
     known = np.zeros(len(pair), bool)
     for i in range(count.max(initial=0)):
         row = np.flatnonzero((count[node] > i) & ~known)
-        known[row] = one_sheet(sheets[pair[row]], sheets[first[node[row]] + i], cell)[0]
+        known[row] = one_sheet(sheets, pair[row], first[node[row]] + i, cell)[0]
     pair, node = pair[~known], node[~known]
     sample, anchor = sheets.sample[pair], sheets.anchor[pair]
     distance = np.linalg.norm(x[node][:, None] - surface.points[sample], axis=2)

@@ -27,7 +27,7 @@ from .crossings import Crossings, node_strides
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
 _SPECK = 27  # nodes
-_TOLERANCE = 1e-3
+_TOLERANCE, _STEPS = 1e-3, 1000
 _ADJACENT = 1.8  # cells, crossings of one patch
 _OPEN = 0.05  # share of crossings with one side at both ends that a closed shape may have
 _PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening that does not count
@@ -141,7 +141,8 @@ def _sides(a, b, crossed, n, outside, progress):
     push = np.asarray(links[free, outside].todense()).reshape(-1)
     progress(0.3)
     scales = diags(1 / np.maximum(degree[free], 1.0))
-    found, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=1000, M=scales, callback=lambda _: progress(0.4))
+    looks = progress.part(0.4, 0.7).each(range(_STEPS))
+    found, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
     side = np.ones(n)
     side[free] = found
     return side

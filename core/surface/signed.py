@@ -12,6 +12,7 @@ from ..field.blocks import Blocks, each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
+from .evening import evened
 from .isosurface import isosurface
 from .mesh import Mesh
 from .pieces import pieces_with_samples
@@ -42,6 +43,7 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     limit = np.float32(_CLAMP * grid.spacing)
     cells, faces = isosurface(each(lambda u: np.clip(u, -limit, limit), values), 0.0)
     vertices = grid.origin + grid.spacing * cells
+    vertices = evened(vertices, faces)
     found = surface.project(vertices, progress.part(0.0, 0.7))
     on = found.distance <= grid.spacing
     vertices[on] = settled(vertices[on], found.step[on], surface, grid.spacing, progress.part(0.7, 0.9))

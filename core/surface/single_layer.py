@@ -1,24 +1,32 @@
 """The single layer: one sheet, open where the surface is open, non-manifold where sheets meet."""
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
 from .crossings import Crossings
+from .evening import evened
 from .holes import fill_pinholes
 from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
 from .rims import smooth_rims
+from .scraps import without_scraps
 from .settling import settled
 from .sharing import shared_vertices
 from .sides import Sides
 from .signed import signed_mesh
 from .triangles import mesh_of
 
+_MENDED = 2  # times, since holes may show where scraps are gone
 _MEETING = 0.01  # share of crossings at meetings of sheets
-_PINHOLES = 1e-3  # share of edges that may be open in a surface that is as good as closed
+_FRAYED, _PINHOLES = 1e-2, 1e-3  # share of edges that may be open in a surface as good as closed, before it is mended
+_TOUCH = 0.35  # cells
 _STIFFNESS = 0.05  # of vertices against moving along what their planes leave open
 
 
@@ -35,9 +43,11 @@ def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurfa
     if sides.complete and not _cross(crossings):
         return signed_mesh(sides.sign(values), surface, grid, progress), 0
     mesh = dual_contour(crossings, surface, grid, progress.part(0.0, 0.6))
-    if sides.complete and _open_share(mesh) > _PINHOLES:
-        return signed_mesh(sides.sign(values), surface, grid, progress.part(0.6, 1.0)), 0
-    return orient(mesh)
+    if not (sides.complete and _open_share(mesh) > _FRAYED):
+        mesh = mended(mesh, surface, grid.spacing)
+        if not (sides.complete and _open_share(mesh) > _PINHOLES):
+            return orient(mesh)
+    return signed_mesh(sides.sign(values), surface, grid, progress.part(0.6, 1.0)), 0
 
 
 def _cross(crossings):
@@ -54,10 +64,9 @@ def _open_share(mesh):
 def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
     """Dual contouring of the zero set (Ju et al., ACM TOG 21(3), 2002), by the edges its two sides are told apart on.
 
-    Every cell that the surface passes has one vertex, the mean of its crossings taken to its foot point, but one for
-    each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two. Where sheets
-    meet, vertices are put where the planes of their crossings meet. What pinholes are left are closed, and
-    borders smoothed.
+    Every cell that the surface passes has one vertex, the mean of its crossings, evened and taken to its foot point,
+    but one for each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two.
+    Where sheets meet, vertices are put where the planes of their crossings meet.
     """
     progress = Progress.of(progress)
     quads, count, kind = shared_vertices(crossings, grid)
@@ -67,11 +76,21 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     meeting = kind > 0
     vertices[meeting] += _to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), grid)[meeting]
     free = kind < 2
+    vertices = evened(vertices, quads, meeting)
     step = surface.project(vertices[free], progress.part(0.0, 0.7)).step
     vertices[free] = settled(vertices[free], step, surface, grid.spacing, progress.part(0.7, 1.0))
-    mesh = _without_repeats(mesh_of(vertices, quads))
-    mesh = pieces_with_samples(mesh, surface.tree, grid.spacing)
-    return smooth_rims(fill_pinholes(mesh, surface, grid.spacing), surface, grid.spacing)
+    mesh = _without_touches(_without_repeats(mesh_of(vertices, quads)), grid.spacing)
+    return pieces_with_samples(mesh, surface.tree, grid.spacing)
+
+
+def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
+    """A dual contour with its pinholes closed, scraps taken off, and its borders smoothed."""
+    for _ in range(_MENDED):
+        filled = fill_pinholes(mesh, surface, cell)
+        mesh = without_scraps(filled, surface, cell)
+        if mesh is filled:
+            break
+    return smooth_rims(mesh, surface, cell)
 
 
 def _to_planes(vertices, corner, place, normal, grid):
@@ -87,6 +106,25 @@ def _to_planes(vertices, corner, place, normal, grid):
     step = np.linalg.solve(matrix + _STIFFNESS * weight[:, None, None] * np.eye(3), right[..., None])[..., 0]
     length = np.linalg.norm(step, axis=1, keepdims=True)
     return step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
+
+
+def _without_touches(mesh, cell):
+    """The mesh with the ends of short edges of more than two faces made one vertex each.
+
+    A sheet that is nearly level with a face of the grid may cross all four of its edges; four quads then touch along
+    an edge between two cells whose vertices almost coincide.
+    """
+    edges, counts = mesh.edge_counts()
+    edges = edges[counts > 2]
+    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    edges = edges[length <= _TOUCH * cell]
+    if not len(edges):
+        return mesh
+    graph = coo_matrix((np.ones(len(edges), bool), tuple(edges.T)), shape=(len(mesh.vertices),) * 2)
+    vertex = connected_components(graph, directed=False)[1]
+    share = np.bincount(vertex)
+    vertices = np.stack([np.bincount(vertex, x) / share for x in mesh.vertices.T], axis=1)
+    return _without_repeats(replace(mesh, vertices=vertices, faces=vertex[mesh.faces].astype(np.int32)))
 
 
 def _without_repeats(mesh):

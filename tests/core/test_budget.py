@@ -1,12 +1,15 @@
 import os
 import subprocess
 import sys
+import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from core import Settings, VADError, reconstruct
 from core.budget import Estimate, check_budget, estimate_cost, free_memory_mb
+from core.cleaning.noise import looks_noisy
 from core.cli import main
 from core.errors import MemoryBudgetError
 from core.field.grid import fit_grid
@@ -40,6 +43,33 @@ def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=os.getcwd())
     estimated, taken = map(float, done.stdout.split())
     assert taken / 1.4 < estimated < 1.4 * taken
+
+
+@pytest.mark.parametrize(("samples", "settings"), [(8000, {}), (1500, {"surface": "both"}), (4000, {"band": 4.0})])
+def test_processor_time_is_what_a_run_takes_within_two_fifths(samples, settings):
+    settings = Settings(resolution=96, denoise=0, **settings)
+    begun = time.process_time()
+    estimated = reconstruct(shapes.sphere(samples), settings).report["estimate"]["cpu_seconds"]
+    taken = time.process_time() - begun
+    assert taken / 1.6 < estimated < 1.6 * taken
+
+
+def test_noise_costs():
+    points = shapes.scattered_sphere(3000)
+    grid, spacing = fit_grid(points, 64), local_spacing(points)
+    clean, noisy = (estimate_cost(spacing, grid, noisy=noisy).cpu_seconds for noisy in (False, True))
+    assert noisy > clean + 0.5
+    moved = points + np.random.default_rng(0).normal(size=points.shape) * 0.03
+    assert not looks_noisy(points, spacing)
+    assert looks_noisy(moved, local_spacing(moved))
+
+
+def test_a_run_beyond_half_of_the_limit_warns():
+    limit = 1.5 * cost(POINTS, 32)[0].memory_mb
+    run = Settings(resolution=32, surface="none")
+    (warning,) = reconstruct(POINTS, replace(run, memory_limit=limit)).report["warnings"]
+    assert f"of {limit:.0f} MiB" in warning
+    assert not reconstruct(POINTS, replace(run, memory_limit=2 * limit)).report["warnings"]
 
 
 def test_the_message_names_the_need_the_limit_and_a_resolution_that_fits():
@@ -77,7 +107,7 @@ def test_a_band_is_the_remedy_and_has_one_itself():
 def test_too_many_points_for_any_grid_are_named():
     _, grid = cost(POINTS, 64)
     with pytest.raises(MemoryBudgetError, match=r"thin the 10000000 points to [0-9]+ or fewer"):
-        check_budget(Estimate(1.0, 50_000.0), 10_000_000, grid, Settings(resolution=64, memory_limit=1000))
+        check_budget(Estimate(1.0, 50_000.0, 1.0), 10_000_000, grid, Settings(resolution=64, memory_limit=1000))
 
 
 def test_auto_is_seven_tenths_of_what_is_free(monkeypatch):

@@ -228,22 +228,23 @@ def test_without_openvdb_the_rest_is_delivered_with_a_warning(capsys, scan, call
     assert REPORT["warnings"] == []
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("presses", [1, 2])
-def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkeypatch, presses):
+def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkeypatch, presses, number):
     def reconstruct(points, settings, progress):
         for _ in range(presses):
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
         assert progress(0.5, "field") is False
         raise cli.Cancelled("cancelled during 'field'; nothing was written")
 
     monkeypatch.setattr(cli, "reconstruct", reconstruct)
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.getsignal(number)
     status, out, err = run(capsys, "reconstruct", scan, "-o", tmp_path / "out")
     assert (status, out) == (130, "")
     assert err.startswith("error: cancelled")
     assert err.count("\n") == 1
     assert os.listdir(tmp_path / "out") == []
-    assert signal.getsignal(signal.SIGINT) == before
+    assert signal.getsignal(number) == before
 
 
 def test_the_bar_shows_on_a_terminal_only(capsys, scan, calls, tmp_path, monkeypatch):
@@ -316,7 +317,8 @@ def test_a_real_process_from_scan_to_files(scan, tmp_path):
     assert np.abs(np.linalg.norm(vertices - [1000, 0, 0], axis=1) - 1).max() < 0.2
 
 
-def test_a_real_process_refuses_and_cancels(scan, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     command = [sys.executable, "-m", "core", "reconstruct", scan, "-o", str(tmp_path / "out")]
     done = subprocess.run([*command, "--resolution", "0"], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
@@ -327,7 +329,7 @@ def test_a_real_process_refuses_and_cancels(scan, tmp_path):
     while running.poll() is None and not (tmp_path / "out").exists():  # made once the scan is read and the work begins
         time.sleep(0.02)
     time.sleep(0.2)
-    running.send_signal(signal.SIGINT)
+    running.send_signal(number)
     _, err = running.communicate(timeout=120)
     assert running.returncode == 130
     assert err.count("\n") == 1

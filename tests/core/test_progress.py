@@ -1,10 +1,13 @@
+import threading
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from core import Cancelled, VADError
-from core.progress import Progress
+from core.progress import Progress, watched
 
 fractions = st.floats(0, 1)
 
@@ -75,3 +78,52 @@ def test_chunks_can_be_cancelled():
     chunks = Progress(lambda fraction, _: fraction < 0.5).chunks(10, 3)
     with pytest.raises(Cancelled):
         list(chunks)
+
+
+class TestWatched:
+    def test_the_callback_hears_everything_in_the_callers_thread(self):
+        heard = []
+
+        def work(progress):
+            for fraction in progress.each([0, 0, 0, 0]):
+                assert fraction == 0
+            return threading.get_ident()
+
+        where = watched(work, lambda *report: heard.append((*report, threading.get_ident())))
+        assert where != threading.get_ident()
+        assert {ident for *_, ident in heard} == {threading.get_ident()}
+        assert sorted({fraction for fraction, *_ in heard}) == [0, 0.25, 0.5, 0.75]
+
+    @pytest.mark.parametrize("progress", [None, Progress()])
+    def test_without_a_callback_there_is_no_thread(self, progress):
+        assert watched(lambda _: threading.get_ident(), progress) == threading.get_ident()
+
+    def test_a_cancel_does_not_wait_for_work_that_is_silent_and_the_work_ends_at_its_next_look(self):
+        awake, looked = threading.Event(), threading.Event()
+
+        def work(progress):
+            progress(0.1)
+            awake.wait(20)
+            try:
+                progress(0.2)
+            finally:
+                looked.set()
+            raise AssertionError("worked on")
+
+        answers = iter([True, True, False])
+        begun = time.perf_counter()
+        with pytest.raises(Cancelled):
+            watched(work, lambda *_: next(answers))
+        assert time.perf_counter() - begun < 10
+        assert not looked.is_set()
+        awake.set()
+        assert looked.wait(10)
+
+    def test_what_either_raises_comes_through(self):
+        def broken(*_):
+            raise RuntimeError("broken")
+
+        with pytest.raises(RuntimeError, match="broken"):
+            watched(broken, lambda *_: True)
+        with pytest.raises(RuntimeError, match="broken"):
+            watched(lambda progress: progress(0.5), broken)

@@ -64,6 +64,24 @@ def test_strays_beside_the_surface_are_found():
     assert marked[~stray].mean() < 0.01
 
 
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.2])
+def test_strays_among_wires_are_found_and_the_wires_stay(share):
+    wires = edges_of_a_box(1000)
+    strays = np.random.default_rng(1).uniform(-0.05, 1.05, (int(1000 * share), 3)) * [1.0, 0.6, 0.4]
+    dropped = find_outliers(np.vstack([wires, strays]))
+    assert dropped[1000:].mean() > 0.6
+    assert dropped[:1000].sum() <= 8
+
+
+def test_of_a_sparse_wire_across_dense_ones_no_more_than_ends_go_with_strays():
+    wires, rng = edges_of_a_box(1000), np.random.default_rng(1)
+    across = np.linspace([0.05, 0.03, 0.02], [0.95, 0.57, 0.38], 20)
+    strays = rng.uniform(0, 1, (50, 3)) * [1.0, 0.6, 0.4]
+    dropped = find_outliers(np.vstack([across, wires, strays]))
+    assert dropped[:20].sum() <= 4  # where it touches the others
+    assert dropped[1020:].mean() > 0.5
+
+
 def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
     rng = np.random.default_rng(1)
     points, stray = with_strays(rng.normal(size=(60, 3)) * 0.05 + [2, 0, 0])

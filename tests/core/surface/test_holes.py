@@ -56,8 +56,8 @@ def test_pinholes_on_the_surface_close_and_the_rim_stays(plane, holes):
     np.testing.assert_allclose(mesh.vertices[:, 2], 0, atol=1e-9)
 
 
-def test_a_loop_longer_than_32_edges_stays(plane):
-    mesh = lattice(block(9, 5))
+def test_a_loop_longer_than_64_edges_stays(plane):
+    mesh = lattice(block(17, 5))
     assert fill_pinholes(mesh, plane, CELL).border_loops() == 2
 
 
@@ -69,10 +69,33 @@ def test_an_opening_where_no_surface_is_stays(plane):
 
 @pytest.mark.parametrize(("bridge", "loops"), [(2.0, 2), (4.0, 1)])
 def test_an_opening_narrower_than_the_bridging_length_closes_anywhere(plane, bridge, loops):
-    """A hole of two cells, 2.8 across its corners, off the surface."""
-    assert 2.0 * np.median(plane.spacing) < 2 * np.sqrt(2) * CELL < 4.0 * np.median(plane.spacing)
+    """A hole of three cells, off the surface."""
+    assert 2.0 * np.median(plane.spacing) < 3 * CELL < 4.0 * np.median(plane.spacing)
     surface = dataclasses.replace(plane, bridge=bridge)
-    assert fill_pinholes(lattice(block(2), 3 * CELL), surface, CELL).border_loops() == loops
+    assert fill_pinholes(lattice(block(3), 3 * CELL), surface, CELL).border_loops() == loops
+
+
+def test_a_long_slit_is_as_wide_as_it_is_narrow(plane):
+    """Two cells by ten, off the surface."""
+    mesh = lattice({(i, j) for i in range(5, 15) for j in (5, 6)}, 3 * CELL)
+    closed = fill_pinholes(mesh, plane, CELL)
+    assert (closed.border_loops(), faults(closed)) == (1, 0)
+    assert closed.face_areas().sum() == pytest.approx((30 * CELL) ** 2)
+
+
+@pytest.mark.parametrize("bridge", [2.0, 20.0])
+def test_the_rim_of_a_small_sheet_is_no_hole(plane, bridge):
+    """On the surface and narrower than the bridging length."""
+    mesh = lattice(set(), n=5)
+    assert fill_pinholes(mesh, dataclasses.replace(plane, bridge=bridge), CELL).border_loops() == 1
+
+
+def test_a_place_of_close_samples_is_no_reason_to_leave_a_hole(plane):
+    """The bridging length is that of the surroundings, not of the sample that happens to be nearest."""
+    spacing = plane.spacing.copy()
+    spacing[plane.tree.query([-0.175, -0.175, 0])[1]] *= 0.2
+    surface = dataclasses.replace(plane, spacing=spacing, bridge=4.0)
+    assert fill_pinholes(lattice(block(3), 3 * CELL), surface, CELL).border_loops() == 1
 
 
 def test_an_opening_below_the_cells_closes_anywhere(plane):
@@ -114,3 +137,17 @@ def test_edges_that_form_no_loop_are_left_alone(plane):
     mesh = fill_pinholes(Mesh(vertices, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], np.int32)), plane, 0.01)
     corners = np.sort(mesh.faces, axis=1)
     assert len(np.unique(corners, axis=0)) == len(corners)
+
+
+def test_a_hole_in_a_corner_closes_along_both_other_sheets(plane):
+    """Its border is one edge: a triangle of the wall is missing between two that stand on the floor."""
+    mesh = wall()
+    closed = fill_pinholes(mesh, plane, CELL)
+    sides = [np.sort(mesh.faces[:, [k, (k + 1) % 3]], axis=1) for k in range(3)]
+    foot = np.flatnonzero((closed.vertices[closed.faces][..., 2] > 1e-9).sum(axis=1) == 1)
+    gone = foot[np.abs(closed.vertices[closed.faces[foot]].mean(axis=1)[:, 1]).argmin()]
+    holed = Mesh(closed.vertices, np.delete(closed.faces, gone, axis=0))
+    assert len(sides) == 3
+    assert (holed.edge_counts()[1] == 1).sum() == (closed.edge_counts()[1] == 1).sum() + 2
+    again = fill_pinholes(holed, plane, CELL)
+    assert sorted(map(sorted, again.faces.tolist())) == sorted(map(sorted, closed.faces.tolist()))

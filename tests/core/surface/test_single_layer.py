@@ -148,6 +148,20 @@ def test_sheets_meet_along_one_line_without_slits(name, most):
     assert len(shapes.components(run.sheet)) == 1
 
 
+@pytest.mark.parametrize(("name", "seed"), [("junction", 3), ("crossing", 0)])
+def test_sheets_that_meet_at_random_samples_are_one_surface_without_pockets(name, seed):
+    """Two squares that cross, or one that stands on another: both shrink to a point, so their Euler characteristic is
+    1. Each pocket between faces along their line would add 1, each pinhole or tunnel take 1 away."""
+    rng, turn = np.random.default_rng(seed), shapes.random_rotation(seed)
+    flat, upright = rng.uniform(-1, 1, (2, 1500, 3))
+    flat[:, 2], upright[:, 0] = 0, 0
+    if name == "junction":
+        upright = upright[upright[:, 2] > 0]
+    sheet = single(np.concatenate([flat, upright]) @ turn.T, denoise=0).sheet
+    assert shapes.euler(sheet) == 1
+    assert len(shapes.components(sheet)) == 1
+
+
 @pytest.mark.parametrize(("bridge", "loops"), [(3.0, 2), (8.0, 1)])
 def test_a_hole_narrower_than_bridge_closes_and_a_wider_one_stays_open(bridge, loops):
     points = shapes.holed_square(1000, radius=0.16)
@@ -159,6 +173,15 @@ def test_no_pinholes_at_random_voids():
     sheet = single(shapes.scattered_sphere(1500)).sheet
     assert set(sheet.edge_counts()[1]) == {2}
     assert shapes.euler(sheet) == 2
+
+
+def test_a_sheet_level_with_the_grid_in_places_does_not_touch_itself():
+    """Its saddles cross all four edges of some faces of the grid."""
+    points = np.random.default_rng(0).uniform(-1, 1, (2500, 3))
+    points[:, 2] = 0.2 * np.sin(5 * points[:, 0]) * np.sin(5 * points[:, 1])
+    sheet = single(points, denoise=0).sheet
+    assert sheet.edge_counts()[1].max() == 2
+    assert (shapes.euler(sheet), sheet.border_loops()) == (1, 1)
 
 
 def test_a_flap_on_a_closed_shape_is_not_lost():
