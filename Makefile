@@ -38,9 +38,11 @@ bench: $(PEERS_READY) ## compare with other ways on a few shapes (minutes); CASE
 	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH)-quick --quick)
 	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)-quick) --peer --surfaces --save build/results $(ARGS)
 
-bench-full: $(PEERS_READY) ## the same on all shapes and samplings into docs/bench.md (an hour); goes on where it ended; MINUTES=n
+bench-full: $(PEERS_READY) ## on all shapes and samplings into docs/ (an hour); goes on where it ended; MINUTES=n
 	$(if $(CASES),,$(RUN) -m benchmarks.make_cases $(BENCH))
-	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)) --results --page bench --surfaces --repeats 3 --jobs 2 --keep $(BENCH)-kept $(if $(MINUTES),--minutes $(MINUTES))
+	$(RUN) -m benchmarks $(or $(CASES),$(BENCH)) --results --page bench --surfaces --repeats 3 --jobs 2 \
+		--keep $(BENCH)-kept $(if $(MINUTES),--minutes $(MINUTES)); \
+	status=$$?; $(RUN) -m benchmarks.paper && $(RUN) -m benchmarks.claims && exit $$status
 
 clean: ## remove what the other targets made, the environment included
 	rm -rf $(VENV) demo dist build .pytest_cache .ruff_cache .hypothesis

@@ -89,11 +89,18 @@ CASES = {
 }
 
 
-def make_case(folder: Path, name: str) -> Path:
-    """Write the case `name` into the folder; the same name gives the same arrays."""
+def sampled(name: str) -> tuple[Surface, np.ndarray, np.ndarray, np.random.Generator]:
+    """Surface, points and normals (n,3) of the case `name` before noise and strays, and what its chance goes on from;
+    the same name gives the same."""
     recipe, rng = CASES[name], np.random.default_rng(zlib.crc32(name.encode()))
     surface = recipe.surface()
-    points, normals = recipe.take(surface, recipe.count, rng)
+    return surface, *recipe.take(surface, recipe.count, rng), rng
+
+
+def make_case(folder: Path, name: str) -> Path:
+    """Write the case `name` into the folder; the same name gives the same arrays."""
+    recipe = CASES[name]
+    surface, points, normals, rng = sampled(name)
     arrays = {"points": points + 0.008 * recipe.noise * rng.normal(size=points.shape), "normals": normals}
     if recipe.strays:
         arrays = _strewn(arrays, recipe.strays, rng)

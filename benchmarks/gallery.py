@@ -13,7 +13,10 @@ from core import Settings, reconstruct
 from core.io.atomic import writable_folder
 from core.normals.pca import pca_normals
 
-from .pictures import View, caption, draw_errors, draw_points, draw_surface, error_scale, save, sheet
+from .catalogue import sampled
+from .metrics import surface_errors
+from .peers import PEERS, check_open3d
+from .pictures import View, caption, draw_distances, draw_errors, draw_points, draw_surface, error_scale, save, sheet
 from .sampling import blue_noise, pierced, uniform, wires
 from .shapes import bordered, closed, junctions, one_sided
 from .status import DONE, exit_status
@@ -114,6 +117,27 @@ def _two_sheets(rng):
     return points
 
 
+def lost(path: Path) -> Path:
+    """Cases on which a peer has less error: our surface above, that peer's below, coloured by the distance to truth."""
+    check_open3d()
+    shown = [
+        ("cube_5k", "pivoting", (3, 6, 12), 4, View()),
+        ("petals_1000", "pivoting", (2, 4), 12, View((-0.5, -1.0, 0.9))),
+        ("torus_wires_3k", "poisson", None, 4, View((-0.4, -1.0, 1.1))),
+    ]
+    figure, panels = sheet(2, len(shown), 3.2)
+    for column, (case, name, variant, worst, view) in zip(panels.T, shown, strict=True):
+        surface, points, *_ = sampled(case)
+        peer = PEERS[name]
+        camera = view.camera(points, _PIXELS)
+        meshes = {"VAD": reconstruct(points).surface, peer.title: peer.finish(peer.prepare(points), variant)}
+        for panel, (way, mesh) in zip(column, meshes.items(), strict=True):
+            draw_distances(panel, mesh, surface.mesh, worst * 1e-3, camera)
+            off = surface_errors(mesh, surface.mesh)
+            caption(panel, f"{case}: {way}", f"CD {off['cd']:.2f}, HD {off['hd']:.0f}; darkest: {worst} × 10⁻³ off")
+    return save(figure, path)
+
+
 def control(path: Path) -> Path:
     """Rows of points that may be shelves or walls: axes found, held flat at two sides, held upright above and below."""
     points = _rows()
@@ -152,6 +176,7 @@ FIGURES = {
     "gaps": gaps,
     "control": control,
     "limits": limits,
+    "lost": lost,
 }
 
 

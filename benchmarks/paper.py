@@ -99,7 +99,7 @@ def _write(docs):
 
 def write_page(docs: Path) -> Path:
     """Write paper.md from the runs saved below `docs`. Returns the page."""
-    runs = _runs(docs)
+    runs = saved_runs(docs)
     if not runs:
         raise InputError(f"{docs} holds no results; make them with python -m benchmarks FOLDER --results")
     pages = list(dict.fromkeys(page for page, _ in runs))
@@ -124,8 +124,8 @@ def write_page(docs: Path) -> Path:
     return path
 
 
-def _runs(docs):
-    """Saved runs by page and sampling."""
+def saved_runs(docs: Path) -> dict[tuple[str, str], dict]:
+    """Runs saved below `docs`, by page and sampling."""
     places = {
         (page, sampling): docs / page / f"{sampling.replace(' ', '_')}.json" for page in PAGES for sampling in SAMPLINGS
     }

@@ -20,10 +20,13 @@ from core.io.atomic import atomic_path
 from scripts.picture import ACCENT, CLAY, INK, KEY_LIGHT, QUIET, plane_section, points_image
 from scripts.render import Camera, dome_light, render, turned_discs
 
+from .geometry import closest_points, face_normals, surface_samples
+
 _LIGHTS = 40
 _WORST_ANGLE = 30.0
 _ERRORS = LinearSegmentedColormap.from_list("errors", ["#c3cdd6", "#f0a35e", ACCENT, "#7a1626", "#16060a"])
 _DPI = 90
+_DISCS = 40_000
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,15 @@ def draw_errors(axes: plt.Axes, points: np.ndarray, axes_found: np.ndarray, trut
     agreement = np.abs(np.einsum("ni,ni->n", axes_found, truth)).clip(0, 1)
     colours = _ERRORS(np.degrees(np.arccos(agreement)) / _WORST_ANGLE)[:, :3]
     vertices, faces = turned_discs(points, truth, 0.9 * spacing_of(points))
+    axes.imshow(render(vertices, faces, np.repeat(colours, 8, axis=0), camera, cull=False), interpolation="lanczos")
+
+
+def draw_distances(axes: plt.Axes, mesh: Mesh, truth: Mesh, worst: float, camera: Camera) -> None:
+    """Points of the mesh as discs on it, coloured by their distance to the truth; `worst` and more is darkest."""
+    points, face = surface_samples(mesh, _DISCS, np.random.default_rng(0))
+    colours = _ERRORS(closest_points(points, truth)[0] / worst)[:, :3]
+    radius = 1.2 * np.sqrt(mesh.face_areas().sum() / _DISCS)
+    vertices, faces = turned_discs(points, face_normals(mesh)[face], radius)
     axes.imshow(render(vertices, faces, np.repeat(colours, 8, axis=0), camera, cull=False), interpolation="lanczos")
 
 

@@ -1,4 +1,4 @@
-"""The plots of docs/normals.md."""
+"""The plots of docs/normals.md and of the pages of results."""
 
 from pathlib import Path
 
@@ -10,6 +10,9 @@ import matplotlib.pyplot as plt
 from matplotlib.ticker import MaxNLocator
 
 from core.io.atomic import atomic_path
+
+from .against import OURS, best_peer, contenders
+from .peers import PEERS
 
 INK, QUIET, ACCENT = "#1b2430", "#66707c", "#e4572e"
 COLOURS = ["#17344f", "#3f7fa3", ACCENT, "#c9a227", "#6a8d55"]
@@ -64,6 +67,29 @@ def plot_growth(path: Path, measured: list[dict]) -> None:
         )
         axes.set(xscale="log", yscale="log", xlabel="points", ylabel=f"CPU time / Delaunay's at {counts[0]:,} points")
         axes.legend()
+        _save(figure, path)
+
+
+def plot_cd(path: Path, results: list[dict]) -> None:
+    """CD of every way on every case that can be compared, over that of our double cover, best case for us on top."""
+    results = sorted(results, key=lambda result: result["mesh"]["cd"] / result["peers"][best_peer(result)]["cd"])
+    found = {result["case"]: {n: m["cd"] for n, m in contenders(result).items() if "cd" in m} for result in results}
+    cases = list(found)
+    titles = OURS | {name: peer.title for name, peer in PEERS.items()}
+    marks = dict(zip(titles, "|dosv^P", strict=True))
+    colours = dict(zip(titles, [ACCENT, ACCENT, *COLOURS[:2], *COLOURS[3:], QUIET], strict=True))
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(8, 1.4 + 0.2 * len(cases)), layout="constrained")
+        for way, title in titles.items():
+            rows = [row for row, case in enumerate(cases) if way in found[case]]
+            ratios = [found[cases[row]][way] / found[cases[row]]["double"] for row in rows]
+            axes.plot(ratios, rows, marks[way], color=colours[way], label=title, markersize=5, alpha=0.9)
+        axes.axvline(1, color=ACCENT, linewidth=1)
+        axes.set_yticks(range(len(cases)), cases, fontsize=8)
+        axes.set(
+            xscale="log", xlabel="CD / that of VAD's double cover; left of the line is better", ylim=(len(cases), -1)
+        )
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, fontsize=8)
         _save(figure, path)
 
 

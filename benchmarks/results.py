@@ -5,8 +5,9 @@ from pathlib import Path
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 
-from .against import alone_section, peer_tables, ways
+from .against import alone_section, compared, peer_tables, ways
 from .peers import PEERS, SHORT
+from .plots import plot_cd
 from .repeatability import OURS
 from .report import markdown_tables
 from .run import TWICE_UP_TO, missing
@@ -99,10 +100,19 @@ def write_results(runs: dict[str, dict], name: str = "results") -> Path:
     for sampling, run in runs.items():
         write_report(folder / _file(sampling), run)
         tables = "\n".join(part(run["cases"], level=3) for part in (peer_tables, markdown_tables))
-        text += f"\n## Samples: {sampling}\n\n{tables}"
+        text += f"\n## Samples: {sampling}\n\n{_picture(run, folder, sampling)}{tables}"
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return page
+
+
+def _picture(run, folder, sampling):
+    """The link to the plot of the run, which is drawn; empty where there is nothing to compare."""
+    if not (found := compared(run["cases"])):
+        return ""
+    path = folder / _file(sampling).replace(".json", ".png")
+    plot_cd(path, found)
+    return f"![CD of every way on every case over that of ours]({folder.name}/{path.name})\n\n"
 
 
 def _command(run, name):

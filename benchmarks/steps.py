@@ -93,18 +93,22 @@ def rounds(path: Path) -> Path:
 
 
 def cuts(path: Path) -> Path:
-    """The field across shapes that have no inside: open, meeting, one-sided, thin."""
+    """The field across shapes that have no inside: open, meeting, one-sided."""
+    upright, lying = [0, 1, 2], [0, 2, 1]
     shown = [
-        ("cloth", bordered.cloth, 10_000, 1, 0.05),
-        ("spiral", bordered.spiral, 5_000, 1, 0.0),
-        ("roll", junctions.toilet_paper, 10_000, 1, 0.0),
-        ("candy", junctions.candy, 10_000, 1, 0.0),
-        ("Klein bottle", one_sided.klein, 10_000, 1, 0.0),
+        ("cloth", bordered.cloth, 10_000, upright),
+        ("petals", bordered.petals, 10_000, upright),
+        ("roll", junctions.toilet_paper, 10_000, lying),
+        ("sweet", junctions.candy, 10_000, upright),
+        ("Klein bottle", one_sided.klein, 10_000, upright),
     ]
     figure, panels = sheet(1, len(shown))
-    for panel, (title, make, count, axis, place) in zip(panels[0], shown, strict=True):
-        points, _ = blue_noise(make(), count, np.random.default_rng(0))
+    for panel, (title, make, count, order) in zip(panels[0], shown, strict=True):
+        points = blue_noise(make(), count, np.random.default_rng(0))[0][:, order]
         result = reconstruct(points)
-        draw_cut(panel, result.field, result.surface, axis, place, 1.3 * np.ptp(points, axis=0)[[0, 2]].max())
+        draw_cut(panel, result.field, result.surface, 1, 0.03, 1.0)
+        middle, half = (points.min(axis=0) + points.max(axis=0)) / 2, 0.56 * np.ptp(points, axis=0)[[0, 2]].max()
+        panel.set_xlim(middle[0] - half, middle[0] + half)
+        panel.set_ylim(middle[2] - half, middle[2] + half)
         caption(panel, title, f"{count:,} points")
     return save(figure, path)

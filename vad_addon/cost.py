@@ -9,7 +9,7 @@ from ..core.budget import estimate_cost
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
 from ..core.points import local_spacing, prepare_samples
-from ..core.settings import Settings, options
+from ..core.settings import WHOLE_BOX, Settings, options
 from . import points_in, status
 from .properties import chosen, settings_from
 
@@ -108,7 +108,8 @@ class VAD_OT_estimate(bpy.types.Operator):
 
 
 class VAD_OT_use_resolution(bpy.types.Operator):
-    """Take the resolution at which a cell is as large as the points are apart: finer ones show hardly more detail"""
+    """Take the resolution at which a cell is as large as the points are apart: finer ones show hardly more detail.
+    Where the whole box would be too much, take a band of 4 cells, too"""
 
     bl_idname = "vad.use_resolution"
     bl_label = "Use It"
@@ -120,7 +121,10 @@ class VAD_OT_use_resolution(bpy.types.Operator):
         return bool(lines(context))
 
     def execute(self, context):
-        context.scene.vad.resolution = suits()
+        stored = context.scene.vad
+        stored.resolution = suits()
+        if suits() > WHOLE_BOX and stored.band == "none":
+            stored.band = "4"
         return {"FINISHED"}
 
 

@@ -172,12 +172,18 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
             ("VIEW", "View", "The direction you look in"),
             ("ACTIVE", "Active Element", "Normal of the active face, direction of the active edge, axis of the vertex"),
             ("CURSOR", "3D Cursor", "From each point towards the 3D cursor"),
-            ("TYPED", "Typed", "The axis typed below"),
+            ("TYPED", "Typed Values", "The axis typed below"),
         ],
     )
     axis: bpy.props.FloatVectorProperty(
         name="Axis", description="The axis, in world space; its sign and length do not matter", default=(0, 0, 1)
     )
+
+    def execute(self, context):
+        done = super().execute(context)
+        if done == {"FINISHED"} and not bpy.app.background:
+            context.scene.vad.overlay.show = True  # to see them
+        return done
 
     def draw(self, context):
         self.layout.prop(self, "origin")

@@ -10,6 +10,11 @@ from .points_in import point_count, selection_problem, sources
 from .presets import VAD_PT_presets
 
 MAIN_SETTINGS = ("resolution", "bridge", "offset")
+MATTERS_WITH = {  # greyed out unless another setting has this value
+    "backend": ("solver", "energy"),
+    "device": ("solver", "energy"),
+    "diffusion": ("integration", "poisson"),
+}
 
 
 class _Sidebar:
@@ -131,7 +136,7 @@ class VAD_PT_axes(_Sidebar, bpy.types.Panel):
 
     def draw(self, context):
         column = self.layout.column(align=True)
-        for item in extras.VAD_OT_fix_axes.bl_rna.properties["origin"].enum_items:
+        for item in bpy.ops.vad.fix_axes.get_rna_type().properties["origin"].enum_items:
             column.operator(extras.VAD_OT_fix_axes.bl_idname, text=f"From {item.name}").origin = item.identifier
         self.layout.operator(extras.VAD_OT_free_axes.bl_idname)
 
@@ -157,4 +162,7 @@ def _settings_column(layout, scene_settings, names):
     layout.use_property_decorate = False
     column = layout.column()
     for name in names:
-        column.prop(scene_settings, name)
+        row = column.row()
+        other, value = MATTERS_WITH.get(name, (name, None))
+        row.active = value is None or getattr(scene_settings, other) == value
+        row.prop(scene_settings, name)

@@ -46,7 +46,8 @@ class VAD_preferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context):
-        column = self.layout.column(heading="Defaults for scenes in which nothing else was chosen")
+        self.layout.label(text="In scenes where nothing else was chosen:")
+        column = self.layout.column()
         column.use_property_split = True
         for name in PREFERRED:
             column.prop(self, name)

@@ -26,10 +26,12 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
 
     strength: bpy.props.FloatProperty(
         name="Strength",
-        description="How far points are moved: not at all (0) to all the way (1)",
+        description="How far points are moved: not at all (0) to all the way (1). Starts from Denoise in the tab where "
+        "that is a number above 0, else from 1",
         default=1.0,
         min=0.0,
         max=1.0,
+        options={"SKIP_SAVE"},
     )
     outliers: bpy.props.BoolProperty(
         name="Outliers", description="Drop stray points far from any surface", default=True
@@ -40,7 +42,10 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
 
     def prepare(self, context):
         self._objects, self._source = _selected(context)
-        settings = settings_from(context.scene.vad, denoise=self.strength, outliers=self.outliers)
+        stored = context.scene.vad
+        if not self.properties.is_property_set("strength") and settings_from(stored).denoise not in {"auto", 0.0}:
+            self.strength = settings_from(stored).denoise
+        settings = settings_from(stored, denoise=self.strength, outliers=self.outliers)
         return Task(self._source.points, settings, until=CLEANING)
 
     def deliver(self, context, scene, found):

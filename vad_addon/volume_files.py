@@ -93,9 +93,10 @@ def put_back(*_) -> None:
 
 
 def _copy(path, folder):
-    if not _copies.get((path, folder), path / "none").is_file():
-        _copies[path, folder] = adopt(path.stem, path, folder)
-    return _copies[path, folder]
+    copy = _copies.get((path, folder))
+    if copy is None or not copy.is_file():
+        copy = _copies[path, folder] = adopt(path.stem, path, folder)
+    return copy
 
 
 def _warn(volume, problem):

@@ -46,6 +46,7 @@ def test_the_answer_follows_the_settings_and_goes_with_the_points(blender, exten
     stored.band = "none"
     blender.ops.vad.use_resolution()
     assert f"resolution {stored.resolution}" in first[1]
+    assert stored.band == "none"
     scan.data.vertices.add(1)
     scan.data.update()
     blender.context.view_layer.update()
@@ -54,3 +55,14 @@ def test_the_answer_follows_the_settings_and_goes_with_the_points(blender, exten
     add_mesh("Other", sphere)
     scan.select_set(False)
     assert cost.lines(blender.context) == []
+
+
+def test_a_fine_resolution_comes_with_a_band(blender, extension, add_mesh, sphere):
+    x, y = np.meshgrid(np.linspace(0, 1, 1000), [0, 1e-3])  # 800 along the box
+    add_mesh("Rows", np.column_stack([x.ravel(), y.ravel(), np.zeros(2000)]))
+    stored = blender.context.scene.vad
+    blender.ops.vad.estimate()
+    blender.ops.vad.use_resolution()
+    assert stored.resolution > 512
+    assert stored.band == "4"
+    assert extension("vad_addon.properties").settings_from(stored).band == 4.0

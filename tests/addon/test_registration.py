@@ -69,7 +69,7 @@ class Layout:
     def label(self, text="", icon="NONE"):
         self.texts.append(text)
 
-    def prop(self, data, name):
+    def prop(self, data, name, text=""):
         assert name in data.bl_rna.properties
         self.props.append(name)
 
@@ -134,3 +134,20 @@ def test_the_tab_shows_and_hides_what_there_is(blender, extension, add_mesh, sph
     layout = drawn(blender, extension, "VAD_PT_look")
     assert layout.texts == ["[Surface]", "Field", "Points", "[Scan]"]
     assert layout.operators[:5] == ["vad.show"] * 4 + ["vad.reextract"]
+
+
+def test_every_panel_draws_before_and_after_a_run_and_while_axes_are_fixed(blender, extension, add_mesh, sphere):
+    def shown():
+        panels = extension("vad_addon.panel").CLASSES
+        names = [cls.__name__ for cls in panels if not hasattr(cls, "poll") or cls.poll(blender.context)]
+        return {name: drawn(blender, extension, name).operators for name in names}
+
+    assert not {"VAD_PT_look", "VAD_PT_last_run", "VAD_PT_axes"} & set(shown())
+    add_mesh("Scan", sphere)
+    blender.ops.vad.reconstruct(resolution=16)
+    blender.ops.vad.shell()
+    assert {"VAD_PT_look", "VAD_PT_last_run"} <= set(shown())
+    blender.context.view_layer.objects.active = blender.data.objects["Scan"]
+    blender.ops.object.mode_set(mode="EDIT")
+    assert shown()["VAD_PT_axes"] == ["vad.fix_axes"] * 4 + ["vad.free_axes"]
+    blender.ops.object.mode_set(mode="OBJECT")

@@ -75,6 +75,17 @@ def test_strength_and_outliers_are_obeyed(blender, scan, noisy):
     assert_allclose(positions(made), 2 * noisy + [10, 0, 0], atol=1e-5)
 
 
+@pytest.mark.parametrize(("denoise", "share"), [("auto", 1), ("0", 1), ("0.5", 0.5)])
+def test_the_strength_starts_from_the_setting_of_the_scene(blender, scan, denoise, share):
+    blender.ops.vad.denoise(strength=1.0)
+    whole = values(blender.context.view_layer.objects.active.data, "moved")
+    blender.context.view_layer.objects.active = scan
+    blender.context.scene.vad.denoise = denoise
+    blender.ops.vad.denoise()
+    moved = values(blender.context.view_layer.objects.active.data, "moved")
+    assert np.median(moved / whole) == pytest.approx(share, abs=0.01)
+
+
 def test_a_run_goes_on_from_the_cleaned_points(blender, scan):
     blender.ops.vad.denoise()
     blender.ops.vad.reconstruct(resolution=24, denoise="0")
@@ -284,9 +295,10 @@ def test_the_worker_finds_the_same(extension, sphere, tmp_path, until):
 def test_a_task_reaches_the_worker_whole(extension, sphere, tmp_path):
     outcome = extension("vad_addon.outcome")
     settings = extension("core.settings").Settings(resolution=20)
-    task = outcome.Task(sphere, settings, known=(sphere, np.ones(500)), origin=np.array([1.0, 2, 3]))
+    task = outcome.Task(sphere, settings, known=(sphere, np.ones(500)), origin=np.array([1.0, 2, 3]), volume=tmp_path)
     task.save(tmp_path / "task.npz")
     loaded = outcome.Task.load(tmp_path / "task.npz")
     assert (loaded.settings, loaded.until, loaded.constraints) == (settings, "all", None)
     assert_array_equal(loaded.known[0], sphere)
     assert_array_equal(loaded.origin, [1, 2, 3])
+    assert loaded.volume == tmp_path

@@ -10,6 +10,7 @@ from benchmarks.against import alone_section, best_peer, full_table, overview, p
 from benchmarks.alone import time_alone
 from benchmarks.measure_peers import measure_peers
 from benchmarks.peers import PEERS, peer_libraries
+from benchmarks.plots import plot_cd
 from core import Mesh, Settings
 
 
@@ -58,6 +59,17 @@ def test_tables_show_the_lowest_and_what_failed():
     assert len({line.count("|") for line in rows}) == 1
     without_cover = {key: value for key, value in results[0].items() if key != "mesh"}
     assert peer_tables([{"case": "b", "error": "MemoryError"}, without_cover]) == ""
+
+
+def test_the_plot_sets_each_way_over_ours(tmp_path, monkeypatch):
+    drawn = {}
+    monkeypatch.setattr("matplotlib.axes.Axes.plot", lambda _, x, y, *__, label, **___: drawn.update({label: (x, y)}))
+    results = [result("a", 2.0, 1.0, poisson=1.0), result("b", 1.0, 3.0, poisson=4.0, front="crashed")]
+    plot_cd(tmp_path / "cd.png", results)
+    assert drawn["VAD, single layer"] == ([3.0, 0.5], [0, 1])  # b, the better one for us, comes first
+    assert drawn["Poisson"] == ([4.0, 0.5], [0, 1])
+    assert drawn["advancing front"] == ([], [])
+    assert (tmp_path / "cd.png").exists()
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,15 @@
 """The panels of the gallery, on small shapes: what is drawn is there, what is cut away is not."""
 
+import re
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from benchmarks.gallery import FIGURES, FOLDER, main
-from benchmarks.pictures import View, caption, draw_errors, draw_points, draw_surface, save, sheet
+from benchmarks.pictures import View, caption, draw_distances, draw_errors, draw_points, draw_surface, save, sheet
 from benchmarks.shapes.surface import from_implicit
+from core import Mesh
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +54,17 @@ def test_errors_and_points_are_drawn_and_saved_small(ball, tmp_path):
     assert path.stat().st_size < 150_000
 
 
+def test_distances_darken_a_surface_that_is_off(ball):
+    camera = View().camera(ball.vertices, 80)
+    _, panels = sheet(1, 2)
+    draw_distances(panels[0, 0], ball, ball, 0.01, camera)
+    draw_distances(panels[0, 1], Mesh(1.02 * ball.vertices, ball.faces), ball, 0.01, camera)
+    right, off = (panel.images[0].get_array() for panel in panels[0])
+    brightness = [image[..., :3][image[..., 3] > 0.5].mean() for image in (right, off)]
+    assert brightness[0] > 0.75
+    assert brightness[1] < 0.5
+
+
 def test_every_figure_is_there_and_small():
     for name in FIGURES:
         assert 5_000 < (FOLDER / f"{name}.png").stat().st_size < 200_000
@@ -60,3 +74,16 @@ def test_unknown_figures_are_refused(capsys):
     with pytest.raises(SystemExit):
         main(["teapot"])
     assert "no figure is called teapot" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/figures.md", "docs/limits.md"])
+def test_links_lead_somewhere(page):
+    page = FOLDER.parent.parent / page
+    for target in re.findall(r"\]\((?!https?:)([^)]*)\)", page.read_text("utf-8")):
+        file, _, heading = target.partition("#")
+        linked = page.parent / file if file else page
+        assert linked.exists(), target
+        if heading:
+            titles = re.findall(r"^#+ (.*)$", linked.read_text("utf-8"), re.MULTILINE)
+            anchors = {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+            assert heading in anchors, target

@@ -16,7 +16,6 @@ def case(gui):
     gui.thin_out(bust.data, 7)
     overlay = bpy.context.scene.vad.overlay
     overlay.colour, overlay.fixed_colour, overlay.width = (*LINES, 1.0), (*FIXED, 1.0), 2.0
-    overlay.show = True
     with gui.override():
         bpy.ops.view3d.view_selected()
         bpy.ops.object.mode_set(mode="EDIT")
@@ -37,6 +36,7 @@ def case(gui):
     with gui.override():
         assert bpy.ops.vad.fix_axes("INVOKE_DEFAULT", True, origin="TYPED", axis=(0, 0, 1)) == {"FINISHED"}
     yield 0.3
+    assert overlay.show
     assert pixels("2_fixed", FIXED) > 200
     with gui.override():
         assert bpy.ops.vad.free_axes("INVOKE_DEFAULT", True) == {"FINISHED"}
@@ -56,7 +56,8 @@ def case(gui):
     bpy.context.scene.vad.resolution = 48
     assert bpy.ops.vad.reconstruct() == {"FINISHED"}
     bust.hide_set(False)
-    next(obj for obj in bpy.context.scene.vad.result.objects if obj["vad_role"] == "surface").hide_set(True)
+    for obj in bpy.context.scene.vad.result.objects:
+        obj.hide_set(obj["vad_role"] != "samples")
     yield 0.3
     assert pixels("6_both", FIXED) > 100
     shown = pixels("6_both", LINES)

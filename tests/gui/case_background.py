@@ -1,4 +1,5 @@
-"""The command of the README, in a Blender of its own without a window, on a file saved in this one."""
+"""The preferences; and the command of the README, in a Blender of its own without a window, on a file saved in this
+one."""
 
 import re
 import subprocess
@@ -8,6 +9,10 @@ import bpy
 
 def case(gui):
     yield from gui.install()
+    with gui.override():
+        bpy.ops.preferences.addon_show(module="bl_ext.user_default.vad")
+    yield 2.0
+    gui.shot("0_preferences")
     bpy.ops.wm.save_userpref()  # where the extension is enabled
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
