@@ -7,7 +7,6 @@ import numpy as np
 from core import Mesh, Settings, reconstruct
 from core.cleaning.noise import noisy_samples
 from core.cleaning.offsets import alternate
-from core.cleaning.outliers import find_outliers
 from core.normals.pca import pca_normals
 from core.points import local_spacing, prepare_samples
 
@@ -18,6 +17,8 @@ from .peers import PEERS, Clock, poisson
 
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 HALF_NOISE = 0.5
+FAINT = (("slab", 0.5, 0.05), ("slab", 0.5, 0.1), ("slab", 0.5, 0.15), ("slab", 0.5, 0.2), ("cap", 0.02, 0.4))
+FAINT += (("cap", 0.04, 0.4), ("cap", 0.08, 0.4))  # part, its share of the points, noise in local spacings
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24
@@ -111,14 +112,35 @@ def measure_strays(case: Case, share: float) -> dict:
     }
 
 
-def measure_wires(count: int = 1000, share: float = 0.05, seed: int = 0) -> dict:
-    """Shares of the strays found among `count` points on the edges of a box, and of those points lost with them."""
-    rng = np.random.default_rng(seed)
-    points = rng.integers(0, 2, (count, 3)).astype(float)
-    points[np.arange(count), rng.integers(0, 3, count)] = rng.random(count)
-    strays = rng.uniform(0.5 - 0.5 * MARGIN, 0.5 + 0.5 * MARGIN, (int(share * count), 3))
-    dropped = find_outliers(prepare_samples(np.vstack([points, strays])).points)
-    return {"points": count, "share": share, "found": dropped[count:].mean(), "lost": dropped[:count].mean()}
+def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
+    """What it costs that faint noise, or noise in a small part, is left alone. `share` of the points, those with the
+    largest x (a "slab") or nearest to the topmost one (a "cap"), get noise of `level` median local spacings. CD as it
+    comes out, and with these points alone cleaned; share of them moved."""
+    points = case.points
+    from_top = np.linalg.norm(points - points[points[:, 2].argmax()], axis=1)
+    rank = -points[:, 0] if part == "slab" else from_top
+    noisy_there = rank <= np.quantile(rank, share)
+    shift = np.random.default_rng(0).normal(size=points.shape) * level * np.median(local_spacing(points))
+    points = np.where(noisy_there[:, None], points + shift, points)
+    result, every = reconstruct(points), reconstruct(points, Settings(denoise=1, surface="none"))
+    best, own = points.copy(), noisy_there[every.source_index]
+    best[every.source_index[own]] = every.points[own]
+    moved = (result.points != points[result.source_index]).any(axis=1)
+    return {
+        "case": case.name,
+        "part": part,
+        "share": share,
+        "level": level,
+        "moved": moved[noisy_there[result.source_index]].mean(),
+        "cd": _errors(result.surface, case)["cd"],
+        "cd_best": _errors(reconstruct(best, Settings(denoise=0)).surface, case)["cd"],
+    }
+
+
+def measure_between(case: Case, percent: float) -> dict:
+    """CD of the surface with noise of a level that others have published figures for."""
+    surface = reconstruct(noisy(case, percent)).surface
+    return {"case": case.name, "percent": percent, "cd": _errors(surface, case)["cd"]}
 
 
 def _ours(case, points):

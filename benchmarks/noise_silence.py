@@ -16,7 +16,7 @@ RUNS = {
     "256³, both": (0.0, Settings(surface="both", resolution=256)),
     "512³, band 4": (0.0, Settings(resolution=512, band=4)),
 }
-STOPS = 8  # cancels of a run, evenly spread over its time
+STOPS = {"128³, both": 8, "512³, band 4": 4}  # cancels of a run, evenly spread over its time
 
 _GONE = 60.0  # seconds after which the work of a cancelled run counts as hung
 
@@ -50,7 +50,7 @@ def silences(points: np.ndarray, settings: Settings) -> dict[str, dict]:
     return dict(stages)
 
 
-def stops(points: np.ndarray, settings: Settings, length: float, count: int = STOPS) -> list[dict]:
+def stops(points: np.ndarray, settings: Settings, length: float, count: int) -> list[dict]:
     """Runs of about `length` seconds, cancelled after each of `count` shares of that: when, and the seconds until the
     call was back and until no thread of it was left."""
     return [_stop(points, settings, (turn + 0.5) / count * length) for turn in range(count)]

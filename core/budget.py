@@ -15,7 +15,7 @@ from .settings import WITH_SIDES, Settings, options
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 
 # Measured on runs with default settings over 1,000 to 300,000 samples, resolutions of 64 to 320.
-_MEMORY = {"diagram": 15.0, "sample": 2.2e-3, "field": 130.0, "node": 46e-6}  # MiB
+_MEMORY = {"diagram": 15.0, "sample": 2.2e-3, "field": 85.0, "node": 46e-6, "sides": 1.2e-3}  # MiB
 
 # The same in a band, at resolutions of 256 and 512: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 110.0, "surface": 1.9e-3, "surface with sides": 3.6e-3}  # MiB
@@ -55,7 +55,7 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
         nodes = float(np.prod(grid.shape))
         near = 2.0 * float(np.sum(cells**2 * (_NEAR + cells)))
         work += _NEAR_NODE * near + _NODE * nodes
-        memory = _MEMORY["field"] + _MEMORY["node"] * nodes
+        memory = _MEMORY["field"] + _MEMORY["node"] * nodes + _MEMORY["sides"] * area * sides
     else:
         width, share = _BAND_NEAR
         near = 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells))))
@@ -109,7 +109,8 @@ def _at(resolution, estimate, grid, settings):
     if settings.band is not None:
         return _BAND_MEMORY["field"] + (estimate.memory_mb - _BAND_MEMORY["field"]) * ratio**2
     nodes = np.prod(np.ceil((np.array(grid.shape) - 1) * ratio) + 2)
-    return _MEMORY["field"] + _MEMORY["node"] * nodes
+    rest = max(0.0, estimate.memory_mb - _MEMORY["field"] - _MEMORY["node"] * np.prod(grid.shape))
+    return _MEMORY["field"] + _MEMORY["node"] * nodes + rest * ratio**2 * (settings.surface in WITH_SIDES)
 
 
 def _probe():

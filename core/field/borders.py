@@ -37,7 +37,8 @@ class Rims:
     bridged   : (n,) bool, whether the surface goes on across it
     outward   : (n,3) float64, unit direction of the gap's middle
     opening   : (n,) float64, cosine of half its angle
-    ends      : (n,2,3) float64, steps to the two neighbours that bound it
+    beside    : (n,2) int64, the two neighbours that bound it     ends : (n,2,3) float64, steps to them
+    margin    : (n,3) float64, how far the sheet goes on past the sample and past those two neighbours, at rims
     reach     : (n,) float64, how far the patch covers a bridged gap
     crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ
     limit     : (n,2) float64, distance to them, inf where there is none
@@ -47,7 +48,9 @@ class Rims:
     bridged: np.ndarray
     outward: np.ndarray
     opening: np.ndarray
+    beside: np.ndarray
     ends: np.ndarray
+    margin: np.ndarray
     reach: np.ndarray
     crease: np.ndarray
     limit: np.ndarray
@@ -75,7 +78,7 @@ def _find_rims(samples, points, normals, frames, spacing, neighbours, tree, brid
     n, k = neighbours.shape
     own, theirs = normals[samples], normals[neighbours]
     step = points[neighbours] - points[samples, None]
-    flat = _level(step, own[:, None], theirs) & _aligned(own[:, None], theirs, _FLAT)
+    flat = one_sheet(step, own[:, None], theirs)
     folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
     crease, limit = _creases(step, flat, folded, toward, line, spacing)
     x, y = np.moveaxis(np.einsum("nki,nai->nka", np.where(folded[..., None], lateral, step), frames), 2, 0)
@@ -108,7 +111,9 @@ def _find_rims(samples, points, normals, frames, spacing, neighbours, tree, brid
     bridged = np.isfinite(distance)
     reach = np.where(bridged, np.maximum(DISC * spacing, BRIDGED * np.where(bridged, distance, 0.0)), 0.0)
     ends = np.einsum("nea,nai->nei", ends, frames)
-    return Rims(gap, bridged, outward, np.cos(width / 2), ends, reach, crease, limit)
+    beside = np.take_along_axis(neighbours, bounding, axis=1)
+    margin = np.repeat(RIM * spacing[:, None], 3, axis=1)
+    return Rims(gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, crease, limit)
 
 
 def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray]:
@@ -128,9 +133,8 @@ def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray
     step = lateral * (beyond / np.maximum(length, np.finfo(length.dtype).tiny))
 
     at_rim = tuple(index[open_side & ~rims.bridged[owner]] for index in gap)
-    to_edge = _to_edges(lateral[:, *at_rim].T, rims.ends[sample[at_rim]])
-    edge_distance = np.linalg.norm(to_edge, axis=1)
-    past = np.maximum(edge_distance - RIM * spacing[at_rim], 0)
+    owner = sample[at_rim]
+    to_edge, edge_distance, past = _past_edges(lateral[:, *at_rim].T, rims.ends[owner], rims.margin[owner])
     _replace_where_worse(beyond, step, at_rim, past, to_edge * (past / np.where(past > 0, edge_distance, 1))[:, None])
 
     at_crease = np.nonzero(np.isfinite(rims.limit[:, 0])[sample])
@@ -146,6 +150,11 @@ def _replace_where_worse(beyond, step, place, distance, way):
     worse = distance > beyond[place]
     place = tuple(index[worse] for index in place)
     beyond[place], step[:, *place] = distance[worse], way[worse].T
+
+
+def one_sheet(step, normals, other_normals) -> np.ndarray:
+    """Whether samples with steps (...,3) between them lie on one sheet that is nearly flat there, (...) bool."""
+    return _level(step, normals, other_normals) & _aligned(normals, other_normals, _FLAT)
 
 
 def _level(step, normals, other_normals):
@@ -213,10 +222,13 @@ def _distance_across(rows, points, normals, outward, spacing, tree, bridge, prog
     return across
 
 
-def _to_edges(lateral, ends):
-    """Step (m,3) from the nearer of the two segments [0, end] to `lateral`."""
+def _past_edges(lateral, ends, margin):
+    """Of the two segments [0, end], whose margins (m,3) change along them evenly, the one that `lateral` is least far
+    out of the margin of: step (m,3) from it, its length and how far out, (m,)."""
     squared = np.maximum(np.einsum("mei,mei->me", ends, ends), np.finfo(float).tiny)
     along = np.clip(np.einsum("mi,mei->me", lateral, ends) / squared, 0.0, 1.0)
     steps = lateral[:, None] - along[..., None] * ends
-    nearer = np.einsum("mei,mei->me", steps, steps).argmin(axis=1)
-    return steps[np.arange(len(steps)), nearer]
+    length = np.linalg.norm(steps, axis=2)
+    past = length - (1 - along) * margin[:, :1] - along * margin[:, 1:]
+    chosen = np.arange(len(steps)), past.argmin(axis=1)
+    return steps[chosen], length[chosen], np.maximum(past[chosen], 0)

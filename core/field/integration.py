@@ -52,7 +52,8 @@ def distance_field(
 
 def sample_reach(surface: LocalSurface) -> np.ndarray:
     """How far the patch of each sample covers the surface, (n,), units of the samples."""
-    return np.maximum(DISC * surface.spacing, surface.rims.reach)
+    rims = surface.rims
+    return np.maximum(np.maximum(DISC * surface.spacing, rims.reach), rims.margin.max(axis=1))
 
 
 def _near_samples(surface, grid, progress):

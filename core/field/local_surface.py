@@ -11,6 +11,7 @@ from ..progress import Progress
 from .borders import Rims, find_rims
 from .curvature import bending, tangent_frames
 from .projection import Projection, project
+from .rim_lines import with_rim_lines
 
 NEIGHBOURS = 16  # of a sample, that its patch is fitted to
 _CHUNK = 16384  # samples
@@ -76,5 +77,6 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     frames = tangent_frames(normals)
     neighbours = patch_neighbours(tree, progress.part(0.0, 0.1))
     bend = bending(points, normals, frames, spacing, neighbours, progress.part(0.1, 0.5))
-    rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, progress.part(0.5, 1.0))
+    rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, progress.part(0.5, 0.9))
+    rims = with_rim_lines(rims, points, normals, spacing, tree, progress.part(0.9, 1.0))
     return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)

@@ -17,6 +17,7 @@ from ..field.local_surface import LocalSurface
 from ..linalg import COMPONENTS, principal_axes
 from .mesh import Mesh
 
+_TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
 _LENGTH = 1.5  # smoothing length, local spacings
 _FARTHEST = 0.3  # local spacings, no border moves further
 _CORNER = 0.5  # radians over the smoothing length, a border that turns faster has a corner
@@ -27,10 +28,27 @@ _STRETCH, _MOST = 2.0, 90  # further rows for every cell that borders move, at t
 _RELAXED, _DAMPING = 10, 0.5
 
 
-def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
+def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
+    """The mesh's vertices (v,3) with those at borders where they fall on the surface from a cell further out: at its
+    rims, where these are that near, and a cell and a half off at most."""
+    way = _outward(mesh.vertices, mesh.faces)
+    loop = np.flatnonzero(way.any(axis=1))
+    if not len(loop):
+        return mesh.vertices
+    way, axis, vertices = way[loop], _axes(mesh)[loop], mesh.vertices.copy()
+    way -= np.einsum("li,li->l", way, axis)[:, None] * axis
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+    step = cell * way - surface.project(vertices[loop] + cell * way).step
+    length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), np.finfo(float).tiny)
+    vertices[loop] += step * np.minimum(1.0, _TO_RIM * cell / length)
+    return vertices
+
+
+def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh:
     """The mesh with its borders smoothed along the surface and the rows of vertices beside them evened out.
 
     cell : the grid's
+    at : (v,3), where the borders are smoothed from, or None for the mesh's own vertices; see :func:`at_rims`
 
     Border vertices move in the surface, by 0.3 local spacings at most; the rows beside them follow, so that triangles
     do not get thin. Vertices of edges with three faces or more stay, and so do those where borders touch and the rows
@@ -45,6 +63,8 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     if not len(loop):
         return mesh
     vertices, axis, beside = mesh.vertices.copy(), _axes(mesh), _neighbours(border, loop)
+    if at is not None:
+        vertices[loop] = at[loop]
     spacing = surface.spacing[surface.tree.query(vertices[loop], workers=-1)[1]]
     step = _fairing(vertices, loop, beside, spacing, cell)
     step -= np.einsum("li,li->l", step, axis[loop])[:, None] * axis[loop]
@@ -66,6 +86,22 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
         vertices[row] += _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
         _settle(vertices, row, axis, surface)
     return replace(mesh, vertices=vertices)
+
+
+def _outward(vertices, faces):
+    """Directions (v,3) out of the faces at their borders, zero elsewhere: sums over border edges, by their length."""
+    tail, head, third = (np.roll(faces, -k, axis=1).reshape(-1).astype(np.int64) for k in range(3))
+    key = np.minimum(tail, head) * len(vertices) + np.maximum(tail, head)
+    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
+    border = count[edge.reshape(-1)] == 1
+    tail, head, third = tail[border], head[border], third[border]
+    along = vertices[head] - vertices[tail]
+    squared = np.maximum(np.einsum("ei,ei->e", along, along), np.finfo(float).tiny)
+    out = vertices[tail] - vertices[third]
+    out -= (np.einsum("ei,ei->e", out, along) / squared)[:, None] * along
+    out *= (np.sqrt(squared) / np.maximum(np.linalg.norm(out, axis=1), np.finfo(float).tiny))[:, None]
+    ends = np.concatenate([tail, head])
+    return np.stack([np.bincount(ends, np.tile(out[:, a], 2), len(vertices)) for a in range(3)], axis=1)
 
 
 def _axes(mesh):

@@ -15,7 +15,7 @@ from .holes import fill_pinholes
 from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
-from .rims import smooth_rims
+from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
 from .settling import settled
 from .sharing import shared_vertices
@@ -90,7 +90,7 @@ def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
         mesh = without_scraps(filled, surface, cell)
         if mesh is filled:
             break
-    return smooth_rims(mesh, surface, cell)
+    return smooth_rims(mesh, surface, cell, at_rims(mesh, surface, cell))
 
 
 def _to_planes(vertices, corner, place, normal, grid):

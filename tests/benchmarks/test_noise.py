@@ -10,8 +10,9 @@ import pytest
 pytest.importorskip("matplotlib")
 pytest.importorskip("igl")
 
-from benchmarks import noise_hostile, noise_measure
+from benchmarks import noise_hostile, noise_measure, published
 from benchmarks.cases import Case
+from benchmarks.geometry import surface_samples
 from benchmarks.metrics import surface_errors
 from benchmarks.noise import CASES, SHAPE, main, verdicts, write_page
 from benchmarks.noise_hostile import FILES, POINTS, tried
@@ -21,13 +22,17 @@ from benchmarks.noise_measure import (
     STRAYS,
     half_noisy,
     measure_strays,
-    measure_wires,
     noisy,
     share_noisy,
     strewn,
 )
-from benchmarks.noise_silence import silences
+from benchmarks.noise_silence import silences, stops
+from benchmarks.noise_uneven import mixed
+from benchmarks.noise_wires import CLUSTERED, SHARES, WIRES
+from benchmarks.noise_wires import measure as measure_wires
+from benchmarks.shapes import closed
 from core import Mesh, Settings
+from core.cleaning.outliers import find_outliers
 from tests import shapes
 
 SQUARE = Mesh(np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
@@ -83,14 +88,38 @@ def test_strays_found_and_points_lost_are_told_apart(square, monkeypatch):
     assert clean["cd"] == clean["untreated_cd"] < 20
 
 
-def test_wires_are_not_lost():
-    assert measure_wires(300) == {"points": 300, "share": 0.05, "found": pytest.approx(0.5, abs=0.5), "lost": 0.0}
+@pytest.mark.parametrize("name", WIRES)
+def test_wires_are_what_they_say_and_lose_nothing_without_strays(name):
+    points = WIRES[name](np.random.default_rng(5))
+    assert points.shape[1] == 3
+    assert not find_outliers(points).any()
 
 
-def test_silences_count_every_look():
-    stages = silences(shapes.sphere(300), Settings(resolution=16, surface="none"))
-    assert {"cleaning", "normals", "distance field"} <= set(stages)
-    assert all(found["looks"] >= 1 and found["seconds"] > 0 for found in stages.values())
+def test_strays_among_wires_are_counted():
+    runs = measure_wires("a helix, 600")["runs"]
+    assert [(run["share"], run["clouds"]) for run in runs] == [(share, False) for share in SHARES] + [(CLUSTERED, True)]
+    assert runs[0] == {"share": 0.0, "clouds": False, "found": None, "lost": 0.0}
+    assert all(0.5 < run["found"] <= 1 for run in runs[1:])
+
+
+def test_mixed_densities():
+    points = mixed(closed.torus(), np.random.default_rng(0))
+    third = np.digitize(points[:, 0], np.percentile(closed_samples()[:, 0], (100 / 3, 200 / 3)))
+    assert np.bincount(third) == pytest.approx([67, 333, 1667], rel=0.1)
+
+
+def closed_samples():
+    return surface_samples(closed.torus().mesh, 20_000, np.random.default_rng(1))[0]
+
+
+def test_silences_count_every_look_and_stops_are_prompt():
+    points, settings = shapes.sphere(300), Settings(resolution=16, surface="none")
+    stages = silences(points, settings)
+    assert list(stages)[:2] == ["start", "cleaning"]
+    assert all(found["looks"] >= 1 and found["seconds"] >= 0 for found in stages.values())
+    assert sum(found["looks"] for found in stages.values()) > 10
+    (found,) = stops(points, settings, length=0.05, count=1)
+    assert 0 <= found["stopped"] <= found["gone"] < 5
 
 
 def test_bad_input_is_tried_and_what_breaks_is_told(monkeypatch):
@@ -109,7 +138,10 @@ def test_bad_input_is_tried_and_what_breaks_is_told(monkeypatch):
     assert [row["outcome"] for row in tried()] == ["crashed", "crashed", "refused", "refused"]
 
 
-def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2):
+WAYS = "ours", "bridged", "poisson"
+
+
+def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2, said=1.1, lost=0.0):
     way = {"after": 1.0, "nc": nc, "cd": cd, "hd": 10.0, "cpu": 2.0}
     rows = [
         {
@@ -148,8 +180,40 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2):
             for case in CASES
         ],
         "strays": strays,
-        "wires": {"points": 1000, "share": 0.05, "found": 0.0, "lost": 0.0},
-        "silences": {"clean": {"cleaning": {"looks": 3, "seconds": 0.4, "cpu": silence}}},
+        "wires": [
+            {
+                "wires": "a helix",
+                "runs": [
+                    {"share": 0.0, "clouds": False, "found": None, "lost": lost},
+                    {"share": 0.05, "clouds": True, "found": 0.81, "lost": 0.002},
+                ],
+            }
+        ],
+        "uneven": [{"shape": "a torus", "points": 2000} | {way: {"cd": 0.5, "hd": 9.0} for way in WAYS}],
+        "faint": [
+            {"case": "one", "part": "cap", "share": 0.04, "level": 0.4, "moved": 0.0, "cd": 0.204, "cd_best": 0.199}
+        ],
+        "between": [{"case": case, "percent": percent, "cd": 0.625} for case in CASES for percent in published.NOISE],
+        "costs": [
+            {
+                "case": "one",
+                "sampling": "uniform",
+                "surface": "both",
+                "resolution": 512,
+                "band": 4.0,
+                "cpu_said": 30.0,
+                "cpu": 25.0,
+                "seconds_said": 60.0,
+                "seconds": 50.0,
+                "memory_said": said * 100.0,
+                "memory": 100.0,
+            }
+        ],
+        "silences": {"clean": {"cleaning": {"looks": 3, "seconds": 0.4, "cpu": 0.3}}},
+        "stops": {
+            "clean": [{"after": 1.0, "stopped": silence, "gone": 2.5}, {"after": 2.0, "stopped": 0.1, "gone": 0.1}]
+        },
+        "load": 7.2,
         "noise": rows,
         "categories": dict.fromkeys(CASES, "watertight"),
     }
@@ -162,6 +226,11 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
         assert page.count(f"| {case} |") == 3 * len(NOISE) + 1 + len(STRAYS)
     assert "taken for noisy: 25.0% of other, uniform." in page
     assert "| junk | refused | a·b·ccc" in page
+    assert "| a helix | – / 0.0% | 81% / 0.2% |" in page
+    assert "| one | cap | 4% | 0.4 | 0% | 0.204 | 0.199 |" in page
+    assert "| one | uniform | both | 512, band 4 | 30.0 | 25.0 | 1.20 | 110 | 100 | 1.10 |" in page
+    assert "| 0.3 % noise | 0.62 | 0.62 | 0.62 | 1.20 | – |" in page
+    assert "| clean | 2 | 0.20 | 2.50 |" in page
     assert "c …" in page
     assert (tmp_path / "noise" / "noise.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "noise" / "numbers.json").read_text())["fuzz"] == measured["fuzz"]
@@ -174,7 +243,9 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
         ({"nc": 0.98}, [f"{SHAPE} at 0.5 %: NC", "with 5 % of strays"]),
         ({"cd": 1.0}, [f"{SHAPE} at 0.5 %: CD", "with 5 % of strays"]),
         ({"outcome": "hung"}, ["with 5 % of strays", "of 1 bad inputs"]),
-        ({"silence": 1.5}, ["with 5 % of strays", "the longest work"]),
+        ({"silence": 1.5}, ["with 5 % of strays", "a cancelled run"]),
+        ({"said": 1.5}, ["with 5 % of strays", "the memory said"]),
+        ({"lost": 0.01}, ["with 5 % of strays", "of wires without strays"]),
     ],
 )
 def test_verdicts_follow_the_numbers(change, missed):

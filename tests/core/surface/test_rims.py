@@ -7,7 +7,7 @@ from core import Mesh, Settings, reconstruct
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface import single_layer
-from core.surface.rims import smooth_rims
+from core.surface.rims import at_rims, smooth_rims
 from tests import shapes
 
 LENGTH, FARTHEST = 1.5, 0.3  # smoothing length and limit in local spacings, as the module says
@@ -34,7 +34,7 @@ def pairs():
     with pytest.MonkeyPatch.context() as patch:
         for name, points in CLOUDS.items():
 
-            def kept(mesh, surface, cell, name=name):
+            def kept(mesh, surface, cell, at, name=name):
                 after = smooth_rims(mesh, surface, cell)
                 spacing = surface.spacing[surface.tree.query(mesh.vertices)[1]]
                 found[name] = mesh, after, spacing, surface.points
@@ -89,6 +89,21 @@ def test_waves_of_a_rim_are_damped_as_the_biharmonic_operator_damps_them(waves):
     damped = height / (1 + (waves * LENGTH * SPACING) ** 4)
     assert 2 * np.mean((found - 1) * np.cos(waves * turn)) == pytest.approx(damped, rel=0.05)
     assert found.mean() == pytest.approx(1, abs=1e-4)
+
+
+def test_borders_are_taken_to_the_rim():
+    """To the same place from inside it and from outside, where the surface ends; other vertices stay."""
+    surface, cell, count = flat_surface(), 0.02, 720
+    found = []
+    for radius in (1 - 0.4 * cell, 1 + 0.8 * cell):
+        mesh = annulus(np.full(count, radius), np.full(count, 0.7))
+        at = at_rims(mesh, surface, cell)
+        found.append(at[:count])
+        np.testing.assert_array_equal(at[count:-count], mesh.vertices[count:-count])
+    assert np.median(np.linalg.norm(found[1] - found[0], axis=1)) < 0.1 * cell
+    outside = found[0] * (1 + 0.5 * cell)
+    assert surface.project(found[0]).distance.mean() < 0.02 * cell
+    assert surface.project(outside).distance.mean() > 0.4 * cell
 
 
 def flat_surface():

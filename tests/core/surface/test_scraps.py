@@ -21,7 +21,7 @@ def surface():
 
 
 def quads(corner):
-    a, b, c, d = (corner[i : i + len(corner) - 1, j : j + corner.shape[1] - 1] for i, j in [(0, 0)] * 4)
+    """Triangles of the squares between rows of vertices (m,n), (2(m-1)(n-1),3)."""
     a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
     return np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
 
@@ -74,7 +74,7 @@ def test_a_flap_of_several_cells_stays(surface):
 def test_a_pocket_loses_the_patch_that_is_off_the_surface(surface, side):
     """A strut from the floor to the wall, closed at both ends: three faces more than the sheets."""
     mesh, line = sheets()
-    floor, wall = line[4:6] + side * (SIDE + 1), line[4:6] * 0 + (SIDE + 1) ** 2 + np.array([4, 5])
+    floor, wall = line[4:6] + side * (SIDE + 1), (SIDE + 1) ** 2 + np.array([4, 5])
     strut = quads(np.array([floor, wall]))
     ends = np.array([[line[k], floor[k - 4], wall[k - 4]] for k in (4, 5)])
     assert same(without_scraps(with_more(mesh, [], np.concatenate([strut, ends])), surface, CELL), mesh)
