@@ -17,8 +17,8 @@ from .peers import PEERS, Clock, poisson
 
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 HALF_NOISE = 0.5
-FAINT = (("slab", 0.5, 0.05), ("slab", 0.5, 0.1), ("slab", 0.5, 0.15), ("slab", 0.5, 0.2), ("cap", 0.02, 0.4))
-FAINT += (("cap", 0.04, 0.4), ("cap", 0.08, 0.4))  # part, its share of the points, noise in local spacings
+FAINT = [("slab", 0.5, level) for level in (0.05, 0.1, 0.15, 0.2)]  # part, its share of the points, local spacings
+FAINT += [("cap", share, 0.4) for share in (0.04, 0.08)]
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24

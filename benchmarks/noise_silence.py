@@ -16,7 +16,7 @@ RUNS = {
     "256³, both": (0.0, Settings(surface="both", resolution=256)),
     "512³, band 4": (0.0, Settings(resolution=512, band=4)),
 }
-STOPS = {"128³, both": 8, "512³, band 4": 4}  # cancels of a run, evenly spread over its time
+STOPS = {"128³, both": 6, "512³, band 4": 2}  # cancels of a run, evenly spread over its time
 
 _GONE = 60.0  # seconds after which the work of a cancelled run counts as hung
 

@@ -10,7 +10,7 @@ from scipy.spatial import Delaunay, KDTree
 
 from core import Mesh, MissingDependency
 
-SHORT = 2.0  # seconds of CPU time: what takes less is worth repeating to time it
+SHORT = 5.0  # seconds of CPU time: what takes less is worth repeating to time it
 _PCA_NEIGHBOURS, _ORIENTATION_NEIGHBOURS, _DEPTH = 30, 15, 8
 
 

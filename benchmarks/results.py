@@ -10,7 +10,7 @@ from .peers import PEERS, SHORT
 from .plots import plot_cd
 from .repeatability import OURS
 from .report import markdown_tables
-from .run import TWICE_UP_TO, missing
+from .run import FINE_FROM, TWICE_UP_TO, missing
 
 _THREE_DIGITS = 5e-4
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -53,7 +53,9 @@ so only the latter are worth comparing, and only within a run. Version of our co
   {timing}, and *CPU*: of all threads together, which feels other work on the machine less. *MB*: what the run adds to
   the memory of a process of its own (Poisson's two share one), libraries not included. Parameters
   of the peers come from a stated set and are **the best for each case, chosen with the truth at hand**, which favours
-  them; ours are the defaults. *Clean* are cases without noise, strays, holes or wires. Scale-space
+  them; ours are the defaults. *Clean* are cases without noise, strays, holes or wires. *Finer grid*: the
+  same with twice the cells, on cases of {fine:,} points or more, whose points are closer together than the default's
+  cells; the paper, too, takes 256 cells there. Scale-space
   reconstruction is not in CGAL's Python package and so is missing; [the field](field.md) is measured beside the
   distance to the nearest sample and to PCA's tangent planes. Poisson closes open surfaces by design, and needs an
   orientation, which non-orientable and non-manifold shapes do not have: read it as what the common route gives on the
@@ -95,6 +97,7 @@ def write_results(runs: dict[str, dict], name: str = "results") -> Path:
         field=_FIELD if first["field"] else "",
         delaunay=_DELAUNAY if first["field"] else "",
         timing=_timing(first),
+        fine=FINE_FROM,
         ways=ways(),
     )
     for sampling, run in runs.items():

@@ -26,6 +26,7 @@ from .processes import Failed, one_thread_each, run_fresh, run_warm
 from .repeatability import differences
 
 PEER_LIMIT = 600.0  # seconds, all variants together
+FINE_FROM = 100_000  # points of a case from which our double cover is measured on a grid twice as fine, too
 TWICE_UP_TO = 3_000  # points of a case that is measured twice where times are repeated
 _MISSING = "not measured"
 
@@ -179,6 +180,15 @@ def run_case(path: Path, sampling: str, plan: Plan) -> dict:
         "seconds": clock.seconds,
         "cpu": clock.cpu,
     }
+    if len(case.points) >= FINE_FROM:
+        fine, clock = timed(reconstruct, case.points, replace(settings, resolution=2 * settings.resolution))
+        measured["fine"] = {
+            **surface_errors(fine.surface, case.truth),
+            "variant": f"{2 * settings.resolution} cells",
+            "seconds": clock.seconds,
+            "cpu": clock.cpu,
+            "memory_mb": fine.report["peak_memory_mb"] - before,
+        }
     if plan.field:
         measured["field"] = field_errors(result.field, case.truth, result.points)
         measured["rims"] = past_rims(result.field, case.truth)

@@ -41,6 +41,19 @@ def test_verdicts_follow_the_numbers():
     assert next(verdicts([good[0], result("few", 1.1, 1.1, poisson=1.0)])).startswith("**Missed**")
 
 
+def test_a_finer_grid_counts_where_it_was_measured():
+    big = {**result("big", 1.5, 1.2, poisson=1.0), "fine": measures(0.5, variant="256 cells")}
+    lines = list(verdicts([result("a", 1.0, 1.0, poisson=2.0), big]))
+    assert lines[0].startswith("**Missed**: VAD, double cover: the lowest CD on 1 of 2")
+    assert lines[2].startswith(
+        "VAD, double cover, on a grid twice as fine where it is measured (big): the lowest CD on 2"
+    )
+    rows = overview([result("a", 1.0, 1.0, poisson=2.0), big]).splitlines()
+    assert rows[2] == "| a | **1.000** | **1.000** | – | 2.000 | 0.50 |"
+    assert rows[3] == "| big | 1.500 | 1.200 | **0.500** | 1.000 | 1.50 |"
+    assert "| big | VAD, double cover, finer grid | 256 cells | 0.500 |" in full_table([big])
+
+
 def test_spoiled_cases_count_for_nothing_but_are_shown():
     lines = list(verdicts([result("a", 1.0, 1.0, poisson=2.0), result("n", 3.0, 2.0, "noisy", alpha=1.0)]))
     assert "1 of 1 clean cases" in lines[0]
