@@ -4,6 +4,7 @@ import numpy as np
 
 _FAIR = 0.1  # weight of the squared sides of a triangle beside its area
 _BOUND, _THERE = 1e2, 1e6  # square cells, what an edge and a face count that the mesh has already
+_CHUNK = 1 << 20  # triples of corners that are weighed at a time
 
 
 def fillings(vertices, loops, taken_edges, taken_faces, cell: float) -> tuple[np.ndarray, np.ndarray]:
@@ -17,8 +18,8 @@ def fillings(vertices, loops, taken_edges, taken_faces, cell: float) -> tuple[np
     n = len(vertices)
     triangles, owners = [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)]
     length = np.array([len(loop) for loop in loops])
-    for size in np.unique(length):
-        number = np.flatnonzero(length == size)
+    for number in _of_one_length(length):
+        size = length[number[0]]
         loop = np.stack([loops[i] for i in number])
         at = np.indices((size,) * 3).reshape(3, -1)
         at = at[:, (at[0] < at[1]) & (at[1] < at[2])]
@@ -51,6 +52,13 @@ def face_keys(faces, n: int) -> np.ndarray:
     """One number for each triangle between n vertices, whichever way it is wound, (f,3) -> (f,) int64."""
     a, b, c = np.sort(faces, axis=1).astype(np.int64).T
     return (a * n + b) * n + c
+
+
+def _of_one_length(length):
+    """Numbers of loops of one length, by the lengths (m,) of all; so many at a time that they fit the memory."""
+    for size in np.unique(length):
+        number = np.flatnonzero(length == size)
+        yield from np.split(number, range(_CHUNK // size**3 + 1, len(number), _CHUNK // size**3 + 1))
 
 
 def _cheapest(weight, dear):
