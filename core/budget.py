@@ -15,7 +15,7 @@ from .settings import WITH_SIDES, Settings, options
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 
 # Measured on runs with default settings over 1,000 to 300,000 samples, resolutions of 64 to 320.
-_MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 60.0, "node": 46e-6, "sides": 1.5e-3}  # MiB
+_MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 42.0, "node": 46e-6, "sides": 2.5e-3}  # MiB
 
 # The same in a band, at resolutions of 256 and 512: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 110.0, "surface": 1.9e-3, "surface with sides": 3.6e-3}  # MiB
