@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import run
-from benchmarks.processes import Failed
+from benchmarks.processes import Failed, TooSlow
 from core import Settings
 
 
@@ -67,3 +67,20 @@ def test_cases_of_ten_thousand_points_are_timed_alone(paths, calls):
     plan = run.Plan(Settings(), repeats=3)
     assert [name for name, _ in run.time_cases(paths, "uniform", plan)] == ["a"]
     assert calls == [("time_alone", "a")]
+
+
+@pytest.mark.parametrize("error", [TooSlow, Failed])
+def test_what_starts_as_a_slow_peer_does_is_not_waited_for(error, paths, calls, monkeypatch):
+    def run_warm(_, names, *__, limit):
+        begun.append(names)
+        if names[0] in ("poisson", "alpha"):
+            raise error("no")
+        return {name: {"error": "made up"} for name in names}
+
+    begun = []
+    monkeypatch.setattr(run, "run_warm", run_warm)
+    monkeypatch.setattr("benchmarks.peers.find_spec", lambda module: True)
+    found = next(run.run_cases(paths[:1], "uniform", run.Plan(Settings(), peers=True)))["peers"]
+    slow = {name for name in found if found[name] == {"error": "no"}}
+    assert slow == {"poisson", "trimmed", "alpha"} | ({"pivoting"} if error is TooSlow else set())
+    assert ["pivoting"] not in begun if error is TooSlow else ["pivoting"] in begun
