@@ -80,6 +80,7 @@ class Peer:
     finish   : (that, variant) -> Mesh
     variants : values of its parameter to choose from; (None,) where it has none
     unit     : what the parameter is
+    first_step : what it spends long on before anything else, where others do so, too
     """
 
     title: str
@@ -89,6 +90,7 @@ class Peer:
     finish: Callable
     variants: tuple = (None,)
     unit: str = ""
+    first_step: str = ""
 
     @property
     def available(self) -> bool:
@@ -178,6 +180,7 @@ PEERS = {
         "open3d",
         _poisson_from,
         lambda poisson, _: _mesh(poisson[0]),
+        first_step="orientation",
     ),
     "trimmed": Peer(
         "Poisson, trimmed",
@@ -187,6 +190,7 @@ PEERS = {
         _trim,
         (0.01, 0.03, 0.1, 0.2, 0.4),
         "share of vertices dropped",
+        "orientation",
     ),
     "pivoting": Peer(
         "ball pivoting",
@@ -196,6 +200,7 @@ PEERS = {
         _roll_balls,
         ((2, 4), (1.5, 3, 6), (3, 6, 12)),
         "radii in mean distances to the nearest point",
+        "orientation",
     ),
     "alpha": Peer(
         "alpha shape",

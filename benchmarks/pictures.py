@@ -26,7 +26,7 @@ _LIGHTS = 40
 _WORST_ANGLE = 30.0
 _ERRORS = LinearSegmentedColormap.from_list("errors", ["#c3cdd6", "#f0a35e", ACCENT, "#7a1626", "#16060a"])
 _DPI = 90
-_DISCS = 40_000
+_DISCS = 25_000
 
 
 @dataclass(frozen=True)

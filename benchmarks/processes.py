@@ -15,6 +15,10 @@ class Failed(Exception):
     """What went wrong in the other process, in one line."""
 
 
+class TooSlow(Failed):
+    """That it was not done within its limit."""
+
+
 @contextmanager
 def one_thread_each() -> Iterator[None]:
     """Libraries of processes begun meanwhile use one thread of OpenMP and BLAS each, as fits several at a time."""
@@ -35,7 +39,8 @@ def run_fresh(function: Callable, *arguments):
 
 
 def run_warm(function: Callable, *arguments, limit: float):
-    """The same in a copy of a Python that has loaded the peers' libraries and no more, within `limit` seconds."""
+    """The same in a copy of a Python that has loaded the peers' libraries and no more. Raises :class:`TooSlow` after
+    `limit` seconds."""
     context = get_context(_WARM)
     if _WARM == "forkserver":
         context.set_forkserver_preload(_LOADED_ONCE)
@@ -49,7 +54,7 @@ def _run(context, function, arguments, limit):
     sender.close()
     try:
         if not receiver.poll(limit):
-            raise Failed(f"not done after {limit:.0f} s")
+            raise TooSlow(f"not done after {limit:.0f} s")
         worked, result = receiver.recv()
     except EOFError:
         process.join()

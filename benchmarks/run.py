@@ -22,10 +22,10 @@ from .field_metrics import field_errors, past_rims
 from .measure_peers import measure_peers
 from .metrics import cover_euler, normal_agreement, surface_errors, topology
 from .peers import PEERS, delaunay_seconds, median_clock, timed
-from .processes import Failed, one_thread_each, run_fresh, run_warm
+from .processes import Failed, TooSlow, one_thread_each, run_fresh, run_warm
 from .repeatability import differences
 
-PEER_LIMIT = 600.0  # seconds, all variants together
+PEER_LIMIT = 400.0  # seconds, all variants together
 FINE_FROM = 100_000  # points of a case from which our double cover is measured on a grid twice as fine, too
 TWICE_UP_TO = 3_000  # points of a case that is measured twice where times are repeated
 _MISSING = "not measured"
@@ -116,18 +116,24 @@ class _Parts:
         return result
 
     def _peers(self, suffix):
-        """What :func:`measure_peers` finds of all that are installed, by name; one that fails has only `error`."""
-        groups, measured = {}, {}
+        """What :func:`measure_peers` finds of all that are installed, by name; one that fails has only `error`.
+        Where one is too slow, those with the same first step are taken to be so, too."""
+        groups, measured, too_slow = {}, {}, {}
         for name, peer in PEERS.items():
             if peer.available:
                 groups.setdefault(peer.prepare, []).append(name)
         for names in groups.values():
             given = names, self.path, self.sampling, self.plan.repeats
             run = partial(run_warm, measure_peers, *given, limit=PEER_LIMIT)
+            first_step = PEERS[names[0]].first_step
             try:
+                if first_step in too_slow:
+                    raise too_slow[first_step]
                 measured |= self.measure(f"{'+'.join(names)}{suffix}", kept.PEERS, run)
             except Failed as error:
                 measured |= {name: {"error": str(error)} for name in names}
+                if isinstance(error, TooSlow) and first_step:
+                    too_slow[first_step] = error
         return measured
 
 
