@@ -50,7 +50,7 @@ def test_energy_solver_reports_progress_and_cancels():
     assert len(inside) > 20
     assert inside == sorted(inside)
     with pytest.raises(Cancelled, match="normals"):
-        reconstruct(POINTS, NUMPY, progress=lambda fraction, text: fraction < 0.15)
+        reconstruct(POINTS, NUMPY, progress=lambda fraction, text: fraction < 0.125)
 
 
 def test_energy_solver_is_deterministic():
