@@ -6,6 +6,7 @@ from ..field.blocks import each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
+from .centring import centred
 from .evening import evened
 from .isosurface import isosurface
 from .mesh import Mesh
@@ -24,10 +25,10 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
              CLAMP cells beyond the offset
 
     The idea of shrinking a double cover is DCUDF's (Hou et al., ACM TOG 42(6), 2023); here every vertex goes straight
-    to its foot point on the local surface, twice, with its faces made even in between, instead of descending a mesh
-    energy. The mesh is closed and each of its edges has two faces, wound so that normals point away from the surface on
-    either side; an open sheet gives one piece, a closed one an outer and an inner piece. Flattened against the surface,
-    rims have thin triangles.
+    to its foot point on the local surface, twice, with its faces made even in between and put astride the surface in
+    the end, instead of descending a mesh energy. The mesh is closed and each of its edges has two faces, wound so that
+    normals point away from the surface on either side; an open sheet gives one piece, a closed one an outer and an
+    inner piece. Flattened against the surface, rims have thin triangles.
 
     Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
@@ -46,6 +47,6 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
         if turn == 0:
             vertices = evened(vertices, faces, found.past_rim)
     progress(0.8)
-    mesh = mesh_of(vertices, faces)
+    mesh = centred(mesh_of(vertices, faces))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)

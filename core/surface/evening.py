@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 
 _ROUNDS, _DAMPING = 5, 0.5
-_FLAT = 0.9  # least cosine between the normals of a vertex and of each face around it, where it may move
+FLAT = 0.9  # least cosine between the normals of a vertex and of each face around it, where it may move
 
 
 def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = False) -> np.ndarray:
@@ -18,8 +18,8 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     corner, ahead = (ends.reshape(-1).astype(np.int64) for ends in (faces, np.roll(faces, -1, axis=1)))
     edge, count = np.unique(np.minimum(corner, ahead) * n + np.maximum(corner, ahead), return_counts=True)
     tail, head = np.divmod(edge, n)
-    normal, least = _normals(vertices, faces)
-    free = ~fixed & (least >= _FLAT)
+    normal, least = vertex_normals(vertices, faces)
+    free = ~fixed & (least >= FLAT)
     free[np.concatenate([tail[count != 2], head[count != 2]])] = False
     free = np.flatnonzero(free)
     links = coo_matrix((np.ones(2 * len(tail)), (np.append(tail, head), np.append(head, tail))), shape=(n, n)).tocsr()
@@ -31,7 +31,7 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     return moved
 
 
-def _normals(vertices, faces):
+def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit normals (v,3) of the vertices, by area, and the least cosine between each and those of its faces, (v,)."""
     n = len(vertices)
     first, second = (0, 2), (1, 3 % faces.shape[1])  # of a quad the diagonals, of a triangle two sides

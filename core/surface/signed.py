@@ -12,6 +12,7 @@ from ..field.blocks import Blocks, each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
+from .centring import centred
 from .evening import evened
 from .isosurface import isosurface
 from .mesh import Mesh
@@ -48,7 +49,7 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     on = found.distance <= grid.spacing
     vertices[on] = settled(vertices[on], found.step[on], surface, grid.spacing, progress.part(0.7, 0.9))
     progress(0.9)
-    mesh = mesh_of(vertices, faces)
+    mesh = centred(mesh_of(vertices, faces))
     progress(0.92)
     _relax(mesh, np.flatnonzero(~on))
     progress(0.96)

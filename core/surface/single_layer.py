@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
+from .centring import centred
 from .crossings import Crossings
 from .evening import evened
 from .holes import fill_pinholes
@@ -46,7 +47,8 @@ def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurfa
     if not (sides.complete and _open_share(mesh) > _FRAYED):
         mesh = mended(mesh, surface, grid.spacing)
         if not (sides.complete and _open_share(mesh) > _PINHOLES):
-            return orient(mesh)
+            mesh, unoriented = orient(mesh)
+            return centred(mesh), unoriented
     return signed_mesh(sides.sign(values), surface, grid, progress.part(0.6, 1.0)), 0
 
 
