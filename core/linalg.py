@@ -1,6 +1,8 @@
-"""Principal axes of many symmetric 3x3 tensors at once, in closed form.
+"""Principal axes of many symmetric 3x3 tensors at once, in closed form; many small systems; sums of products.
 
-A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis.
+A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis. With another
+number of threads BLAS and LAPACK round differently, OpenBLAS even in systems of three equations, so what results depend
+on is summed and solved here.
 """
 
 import numpy as np
@@ -55,6 +57,26 @@ def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     axes[found] /= length[found, None]
     axes[~found] = _by_lapack(tensors[~found])
     return axes, values
+
+
+def solve_positive(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solutions (m,k) of symmetric positive definite systems (m,k,k) with right sides (m,k), by elimination without
+    pivoting, which such systems do not need (G. H. Golub and C. F. Van Loan, Matrix Computations, section 4.2)."""
+    k = right.shape[1]
+    rows = np.ascontiguousarray(np.concatenate([matrices, right[..., None]], axis=2).transpose(1, 2, 0))
+    for p in range(k):
+        share = rows[p + 1 :, p] / rows[p, p]
+        rows[p + 1 :, p + 1 :] -= share[:, None] * rows[p, p + 1 :]
+    found = rows[:, k]
+    for p in reversed(range(k)):
+        found[p] -= (rows[p, p + 1 : k] * found[p + 1 :]).sum(axis=0)
+        found[p] /= rows[p, p]
+    return found.T
+
+
+def inner(a: np.ndarray, b: np.ndarray) -> float:
+    """Sum of the products of two arrays of one shape."""
+    return float((a * b).sum())
 
 
 def _by_lapack(tensors):

@@ -19,6 +19,7 @@ L-BFGS instead of Adam, as it needs no rate.
 import numpy as np
 from scipy.optimize import minimize
 
+from ..linalg import inner
 from ..normals.energy import EnergyWeights, NormalEnergy
 from ..normals.estimate import estimate_normals
 from ..points import local_spacing
@@ -76,7 +77,7 @@ class OffsetEnergy:
         """E_offset of moves (n,) in local spacings, and its gradient (n,)."""
         terms, gradients = self._evaluate(moves)
         scales = np.array([self.weights.distance, self.weights.alignment, self.regularisation])
-        return float(scales @ terms), scales @ gradients
+        return inner(scales, terms), scales @ gradients
 
     def _evaluate(self, moves):
         n = len(moves)
@@ -98,7 +99,9 @@ class OffsetEnergy:
 
         drift = self.drift + moves[:, None] * self.normals
         regular = 2 * _dot(drift, self.normals) + 2 * moves
-        terms = np.array([self.weight @ np.abs(gap), lean @ lean, np.vdot(drift, drift) + moves @ moves])
+        terms = np.array(
+            [inner(self.weight, np.abs(gap)), inner(lean, lean), inner(drift, drift) + inner(moves, moves)]
+        )
         return terms, np.stack([distance, self.spacing * alignment, regular])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..field.curvature import tangent_frames
-from ..linalg import outer, principal_axes
+from ..linalg import outer, principal_axes, solve_positive
 from ..progress import Progress
 
 COEFFICIENTS = 6  # 1, x, y, xx, xy, yy
@@ -67,7 +67,7 @@ def _fit(offset, distance):
         basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
         weighted = basis * share[..., None]
         matrix = weighted.transpose(0, 2, 1) @ basis + _STIFFNESS * np.eye(COEFFICIENTS)
-        coefficients = _solve(matrix, np.einsum("mka,mk->ma", weighted, height))
+        coefficients = solve_positive(matrix, np.einsum("mka,mk->ma", weighted, height))
         residual = height - np.einsum("mka,ma->mk", basis, coefficients)
         full = 1.0 / weight.sum(axis=1)  # the share of a sample that lies on its quadric
         scale = _CAUCHY * 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
@@ -77,11 +77,5 @@ def _fit(offset, distance):
     upright = normal - np.einsum("ma,mai->mi", slope, frame)
     squared = np.einsum("mi,mi->m", upright, upright)
     step = (coefficients[:, 0] / squared)[:, None] * upright
-    leverage = full * _solve(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
+    leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
     return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95)
-
-
-def _solve(matrix, right):
-    """Solutions of many small systems, one right side (m,c) each. OpenBLAS starts threads for every one that has two
-    or is inverted, which takes ten times as long, and hundreds of times on a busy machine."""
-    return np.linalg.solve(matrix, right[..., None])[..., 0]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..linalg import solve_positive
 from ..progress import Progress
 
 _WIDTH = 1.5  # of the Gaussian weight, local spacings
@@ -61,7 +62,7 @@ def _bending(points, normals, rows, frames, spacing, neighbours):
         weighted = row * weight[..., None]
         matrix = matrix + weighted.transpose(0, 2, 1) @ row
         right += np.einsum("nka,nk->na", weighted, value)
-    xx, xy, yy = np.linalg.solve(matrix, right[..., None])[..., 0].T
+    xx, xy, yy = solve_positive(matrix, right).T
 
     size = np.sqrt(xx**2 + 2 * xy**2 + yy**2)
     shrink = np.minimum(1.0, 1.0 / np.maximum(size * spacing, np.finfo(float).tiny))

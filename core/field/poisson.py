@@ -4,6 +4,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 from scipy.ndimage import map_coordinates
 
+from ..linalg import inner
 from ..progress import Progress
 from .grid import Grid
 from .grid_diffusion import check_held, grid_axes
@@ -87,19 +88,19 @@ def _solve(anchor, right, start, progress):
 
     u = start.copy()
     residual = right - _laplacian(u) - anchor * u
-    goal = _TOLERANCE * np.linalg.norm(right)
+    goal = _TOLERANCE * np.sqrt(inner(right, right))
     z = precondition(residual)
-    search, energy = z, np.vdot(residual, z)
+    search, energy = z, inner(residual, z)
     for iteration in range(_MAX_ITERATIONS):
         progress(iteration / _MAX_ITERATIONS)
-        if np.linalg.norm(residual) <= goal:
+        if np.sqrt(inner(residual, residual)) <= goal:
             break
         image = _laplacian(search) + anchor * search
-        step = energy / np.vdot(search, image)
+        step = energy / inner(search, image)
         u += step * search
         fresh = residual - step * image
         z = precondition(fresh)
-        before, energy = energy, np.vdot(fresh, z)
+        before, energy = energy, inner(fresh, z)
         search = z + energy / before * search
         residual = fresh
     return u

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..linalg import inner
 from ..voronoi.bisectors import BisectorSamples
 from ..voronoi.clusters import near_cluster
 
@@ -87,7 +88,7 @@ class NormalEnergy:
     def value_and_gradient(self, normals) -> tuple[float, np.ndarray]:
         """E of unit axes (n,3), and its gradient (n,3) with respect to their components."""
         terms, gradients = self._evaluate(normals)
-        return float(self.scales @ terms), np.tensordot(self.scales, gradients, axes=1)
+        return inner(self.scales, terms), np.einsum("t,tni->ni", self.scales, gradients)
 
     @property
     def scales(self) -> np.ndarray:
@@ -110,7 +111,7 @@ class NormalEnergy:
 
         deviation = _dot(normals[self.owner], self.direction) - (1.0 if self.printed_alignment else 0.0)
         alignment = self._to_owner @ (2 * deviation[:, None] * self.direction)
-        terms = np.array([w @ np.abs(gap), w @ size, deviation @ deviation])
+        terms = np.array([inner(w, np.abs(gap)), inner(w, size), inner(deviation, deviation)])
         return terms, np.stack([distance, gradient, alignment])
 
 

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
+from ..linalg import solve_positive
 from ..progress import Progress
 from .centring import centred
 from .crossings import Crossings
@@ -105,7 +106,7 @@ def _to_planes(vertices, corner, place, normal, grid):
         for b in range(3):
             matrix[:, a, b] = np.bincount(corner, normal[:, a] * normal[:, b], len(vertices))
     weight = np.bincount(corner, minlength=len(vertices))
-    step = np.linalg.solve(matrix + _STIFFNESS * weight[:, None, None] * np.eye(3), right[..., None])[..., 0]
+    step = solve_positive(matrix + _STIFFNESS * weight[:, None, None] * np.eye(3), right)
     length = np.linalg.norm(step, axis=1, keepdims=True)
     return step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
 

@@ -23,9 +23,10 @@ ROOT = Path(__file__).parents[2]
 DIGEST = """
 import hashlib, sys, numpy as np
 from core import Settings, reconstruct
-result = reconstruct(np.load(sys.argv[1]), Settings(resolution=40))
+settings = Settings(resolution=40, surface="both", solver=sys.argv[2], integration=sys.argv[3])
+result = reconstruct(np.load(sys.argv[1]), settings)
 arrays = result.points, result.normals, result.confidence, result.field.values
-arrays += result.surface.vertices, result.surface.faces
+arrays += result.surface.vertices, result.surface.faces, result.sheet.vertices, result.sheet.faces
 print(hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest())
 """
 
@@ -34,8 +35,11 @@ def noisy_sphere(n, deviation=0.02):
     return shapes.scattered_sphere(n) + np.random.default_rng(7).normal(size=(n, 3)) * deviation
 
 
-@pytest.mark.parametrize("deviation", [0.0, 0.03])
-def test_the_number_of_threads_changes_no_byte(tmp_path, deviation):
+@pytest.mark.parametrize(
+    ("deviation", "solver", "integration"),
+    [(0.0, "reflection", "transport"), (0.03, "reflection", "poisson"), (0.0, "energy", "transport")],
+)
+def test_the_number_of_threads_changes_no_byte(tmp_path, deviation, solver, integration):
     np.save(tmp_path / "points.npy", noisy_sphere(3000, deviation))
     digests = set()
     for threads in ("1", "2", "5"):
@@ -43,7 +47,7 @@ def test_the_number_of_threads_changes_no_byte(tmp_path, deviation):
             ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "TBB_NUM_THREADS"), threads
         )
         done = subprocess.run(
-            [sys.executable, "-c", DIGEST, tmp_path / "points.npy"],
+            [sys.executable, "-c", DIGEST, tmp_path / "points.npy", solver, integration],
             cwd=ROOT, env=os.environ | limits, capture_output=True, text=True, check=True,
         )  # fmt: skip
         digests.add(done.stdout)

@@ -1,4 +1,4 @@
-"""Against numpy.linalg.eigh."""
+"""Against numpy.linalg."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.linalg import outer, principal_axes
+from core.linalg import inner, outer, principal_axes, solve_positive
 from tests.shapes import random_rotation
 
 
@@ -79,3 +79,27 @@ def test_axes_almost_along_a_coordinate(tilt):
 def test_no_tensors_give_no_axes():
     axes, values = principal_axes(np.empty((0, 6)))
     assert axes.shape == values.shape == (0, 3)
+
+
+@pytest.mark.parametrize("k", [1, 3, 6])
+@pytest.mark.parametrize("stiffness", [1.0, 1e-6])
+def test_positive_systems(k, stiffness, random):
+    rows = random.normal(size=(2000, k - 1 if k > 1 else 1, k))  # alone they leave a direction free
+    matrices = rows.transpose(0, 2, 1) @ rows + stiffness * np.eye(k)
+    right = random.normal(size=(2000, k))
+    kept = matrices.copy(), right.copy()
+    found = solve_positive(matrices, right)
+    expected = np.linalg.solve(matrices, right[..., None])[..., 0]
+    error = np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1)
+    assert error.max() < 1e-12 / stiffness
+    np.testing.assert_array_equal(matrices, kept[0])
+    np.testing.assert_array_equal(right, kept[1])
+
+
+def test_no_systems():
+    assert solve_positive(np.empty((0, 3, 3)), np.empty((0, 3))).shape == (0, 3)
+
+
+def test_sum_of_products(random):
+    a, b = random.normal(size=(2, 30, 40, 5))
+    assert inner(a, b) == pytest.approx(np.vdot(a, b), rel=1e-12)
