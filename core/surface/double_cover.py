@@ -7,6 +7,7 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
 from .centring import centred
+from .corners import into_corners
 from .evening import evened
 from .isosurface import isosurface
 from .mesh import Mesh
@@ -25,10 +26,10 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
              CLAMP cells beyond the offset
 
     The idea of shrinking a double cover is DCUDF's (Hou et al., ACM TOG 42(6), 2023); here every vertex goes straight
-    to its foot point on the local surface, twice, with its faces made even in between and put astride the surface in
-    the end, instead of descending a mesh energy. The mesh is closed and each of its edges has two faces, wound so that
-    normals point away from the surface on either side; an open sheet gives one piece, a closed one an outer and an
-    inner piece. Flattened against the surface, rims have thin triangles.
+    to its foot point on the local surface, twice, with its faces made even in between, then drawn into concave corners
+    and put astride the surface, instead of descending a mesh energy. The mesh is closed and each of its edges has two
+    faces, wound so that normals point away from the surface on either side; an open sheet gives one piece, a closed one
+    an outer and an inner piece. Flattened against the surface, rims have thin triangles.
 
     Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
@@ -38,15 +39,16 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
     clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)
     progress(0.0)
     cells, faces = isosurface(clamped, level)
-    vertices, part = grid.origin + grid.spacing * cells, progress.part(0.0, 0.8)
+    vertices, part = grid.origin + grid.spacing * cells, progress.part(0.0, 0.7)
     for turn in range(_ROUNDS):
         found = surface.project(vertices, part.part(turn / _ROUNDS, (turn + 1) / _ROUNDS))
         length = np.linalg.norm(found.step, axis=1, keepdims=True)
         share = np.minimum(1.0, _LONGEST_STEP * level / np.maximum(length, np.finfo(float).tiny))
         vertices = vertices - found.step * share
         if turn == 0:
+            side = np.where(found.past_rim[:, None], 0.0, found.step / np.maximum(length, np.finfo(float).tiny))
             vertices = evened(vertices, faces, found.past_rim)
-    progress(0.8)
+    vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
     mesh = centred(mesh_of(vertices, faces))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)

@@ -8,7 +8,6 @@ from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
-from ..linalg import solve_positive
 from ..progress import Progress
 from .centring import centred
 from .crossings import Crossings
@@ -17,6 +16,7 @@ from .holes import fill_pinholes
 from .mesh import Mesh
 from .orientation import orient
 from .pieces import pieces_with_samples
+from .planes import to_planes
 from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
 from .settling import settled
@@ -29,7 +29,7 @@ _MENDED = 2  # times, since holes may show where scraps are gone
 _MEETING = 0.01  # share of crossings at meetings of sheets
 _FRAYED, _PINHOLES = 1e-2, 1e-3  # share of edges that may be open in a surface as good as closed, before it is mended
 _TOUCH = 0.35  # cells
-_STIFFNESS = 0.05  # of vertices against moving along what their planes leave open
+_STIFFNESS = 0.05  # of vertices where sheets meet
 
 
 def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None):
@@ -69,7 +69,7 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
 
     Every cell that the surface passes has one vertex, the mean of its crossings, evened and taken to its foot point,
     but one for each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two.
-    Where sheets meet, vertices are put where the planes of their crossings meet.
+    Where sheets meet, vertices are put where the planes of their crossings meet, a cell away at most.
     """
     progress = Progress.of(progress)
     quads, count, kind = shared_vertices(crossings, grid)
@@ -77,7 +77,9 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     weight = np.bincount(corner, minlength=count)
     vertices = np.stack([np.bincount(corner, place[:, a], count) for a in range(3)], axis=1) / weight[:, None]
     meeting = kind > 0
-    vertices[meeting] += _to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), grid)[meeting]
+    step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[meeting]
+    length = np.linalg.norm(step, axis=1, keepdims=True)
+    vertices[meeting] += step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
     free = kind < 2
     vertices = evened(vertices, quads, meeting)
     step = surface.project(vertices[free], progress.part(0.0, 0.7)).step
@@ -94,21 +96,6 @@ def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
         if mesh is filled:
             break
     return smooth_rims(mesh, surface, cell, at_rims(mesh, surface, cell))
-
-
-def _to_planes(vertices, corner, place, normal, grid):
-    """Steps (v,3) to where the planes of each vertex's crossings meet, in least squares, a cell long at most."""
-    offset = np.einsum("ci,ci->c", normal, place - vertices[corner])
-    matrix = np.zeros((len(vertices), 3, 3))
-    right = np.zeros((len(vertices), 3))
-    for a in range(3):
-        right[:, a] = np.bincount(corner, normal[:, a] * offset, len(vertices))
-        for b in range(3):
-            matrix[:, a, b] = np.bincount(corner, normal[:, a] * normal[:, b], len(vertices))
-    weight = np.bincount(corner, minlength=len(vertices))
-    step = solve_positive(matrix + _STIFFNESS * weight[:, None, None] * np.eye(3), right)
-    length = np.linalg.norm(step, axis=1, keepdims=True)
-    return step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
 
 
 def _without_touches(mesh, cell):
