@@ -1,8 +1,11 @@
 """Other ways from points to a mesh, and the clock that times them and us."""
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 
 import numpy as np
@@ -63,11 +66,19 @@ def poisson(points: np.ndarray) -> tuple[Mesh, np.ndarray, "Clock"]:
     return _mesh(mesh), np.asarray(cloud.normals), clock
 
 
+@cache
 def check_open3d() -> None:
-    """Raises :class:`MissingDependency` where Open3D is missing. Does not load it: a process passes its peak memory
-    on to those it starts."""
+    """Raises :class:`MissingDependency` where Open3D is missing or lacks a library of the system. Loads it in a process
+    of its own, as a process passes its peak memory on to those it starts."""
     if find_spec("open3d") is None:
-        raise MissingDependency("the peer needs Open3D, which is not installed; install open3d or leave --peer out")
+        raise MissingDependency("the peers need Open3D, which is not installed; install open3d or leave --peer out")
+    done = subprocess.run([sys.executable, "-c", "import open3d"], capture_output=True, text=True)
+    if done.returncode:
+        said = done.stderr.strip().splitlines()[-1:] or [f"it ends with {done.returncode}"]
+        raise MissingDependency(
+            f"the peers need Open3D, which does not load: {said[0]}; install what it lacks (Debian: libusb-1.0-0, "
+            "libgl1, libgomp1, libx11-6) or leave --peer out"
+        )
 
 
 @dataclass(frozen=True)

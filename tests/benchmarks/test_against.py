@@ -1,6 +1,8 @@
 """What a comparison adds up to, on made-up results; and each peer that is installed, on a sphere."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +11,9 @@ import pytest
 from benchmarks.against import alone_section, best_peer, full_table, overview, peer_tables, verdicts, ways
 from benchmarks.alone import time_alone
 from benchmarks.measure_peers import measure_peers
-from benchmarks.peers import PEERS, peer_libraries
+from benchmarks.peers import PEERS, check_open3d, peer_libraries
 from benchmarks.plots import plot_cd
-from core import Mesh, Settings
+from core import Mesh, MissingDependency, Settings
 
 
 def measures(cd, **more):
@@ -143,6 +145,15 @@ def test_peers_that_are_not_installed_are_left_out(monkeypatch):
     monkeypatch.setattr("benchmarks.peers.find_spec", lambda module: None)
     assert peer_libraries() == []
     assert ways().count("(not installed, left out)") == len(PEERS)
+
+
+def test_an_open3d_that_does_not_load_is_said_at_once(monkeypatch):
+    monkeypatch.setattr("benchmarks.peers.find_spec", lambda module: True)
+    broken = [sys.executable, "-c", "raise ImportError('libthat is not there')"]
+    run = subprocess.run
+    monkeypatch.setattr("benchmarks.peers.subprocess.run", lambda _, **options: run(broken, **options))
+    with pytest.raises(MissingDependency, match="load: ImportError: libthat is not there; install"):
+        check_open3d.__wrapped__()
 
 
 def timed(ours, others):
