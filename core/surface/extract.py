@@ -11,7 +11,7 @@ from ..field.steps import NearBand
 from ..progress import Progress
 from ..settings import WITH_SIDES, Settings
 from .crossings import find_crossings
-from .double_cover import double_cover
+from .double_cover import CLAMP, double_cover, level_for
 from .isosurface import need_quads
 from .mesh import Mesh
 from .pieces import without_small_pieces
@@ -43,8 +43,12 @@ class Surfaces:
 
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
-    with_sides = settings.surface in WITH_SIDES
-    return max(settings.band, needed_band(local, grid)) if with_sides else settings.band
+    needed = settings.band
+    if settings.surface in WITH_SIDES:
+        needed = max(needed, needed_band(local, grid))
+    if settings.surface in ("double", "both"):
+        needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
+    return needed
 
 
 def extract_surfaces(

@@ -87,14 +87,18 @@ def test_a_bridged_opening_is_spanned_as_in_the_whole_box():
     assert run.surface.vertices[:, 2].max() > 0.9
 
 
-@pytest.mark.parametrize(("kind", "wider"), [("none", 0), ("double", 0), ("single", 1), ("both", 1), ("signed", 1)])
-def test_telling_sides_takes_distances_beyond_the_band(ball, kind, wider):
-    """Regions start at up to half the bridging length; their neighbours are looked at, too."""
-    grid = fit_grid(ball.points, 64)
-    reach = 1.5 * np.median(ball.spacing) / grid.spacing
-    assert 3.5 < reach < 6
+@pytest.mark.parametrize("kind", ["none", "double", "single", "both", "signed"])
+def test_surfaces_take_distances_beyond_the_band(ball, kind):
+    """The double cover those two cells beyond its level. Where sides are told apart, regions start at up to half the
+    bridging length; their neighbours are looked at, too."""
+    grid = fit_grid(ball.points, 80)
+    spacing = np.median(ball.spacing) / grid.spacing
+    assert 2.5 < spacing < 4
     found = band_for(Settings(band=3, surface=kind), ball, grid)
-    assert reach + 1 < found < reach + 2 if wider else found == 3
+    if kind in ("none", "double"):
+        assert found == pytest.approx(3 if kind == "none" else 0.4 * spacing + 2)
+    else:
+        assert 1.5 * spacing + 1 < found < 1.5 * spacing + 2
     assert band_for(Settings(band=12, surface=kind), ball, grid) == 12
 
 

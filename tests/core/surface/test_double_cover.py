@@ -151,3 +151,12 @@ class TestAlone:
     def test_stops_when_told(self, stage):
         with pytest.raises(Cancelled):
             double_cover(*stage, lambda *_: False)
+
+
+@pytest.mark.parametrize("band", [None, 3.0])
+@pytest.mark.parametrize("count", [150, 300])
+def test_few_samples_leave_no_holes(count, band):
+    """At one cell, a tenth of their distance or less, there are holes between the two layers."""
+    surface = reconstruct(shapes.scattered_sphere(count), Settings(resolution=96, band=band)).surface
+    assert [shapes.euler(piece) for piece in shapes.components(surface)] == [2, 2]
+    assert set(surface.edge_counts()[1]) == {2}
