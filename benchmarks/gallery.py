@@ -123,7 +123,6 @@ def lost(path: Path) -> Path:
     shown = [
         ("cube_5k", "pivoting", (3, 6, 12), 4, View()),
         ("torus_wires_3k", "poisson", None, 4, View((-0.4, -1.0, 1.1))),
-        ("bumps_100k", "pivoting", (3, 6, 12), 0.2, View()),
     ]
     figure, panels = sheet(2, len(shown))
     for column, (case, name, variant, worst, view) in zip(panels.T, shown, strict=True):

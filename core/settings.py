@@ -51,9 +51,8 @@ class Settings:
     )
     offset: float = _option(
         1.0,
-        "Distance at which the two layers of the surface are first extracted, before they are pulled onto it; 0.4 of "
-        "the distance between points where that is more. Larger tolerates rougher fields, smaller separates closer "
-        "sheets",
+        "Distance at which the two layers of the surface are first extracted, before they are pulled onto it; more "
+        "where points are over three cells apart. Larger tolerates rougher fields, smaller separates closer sheets",
         limits=(0.5, 4.0),
         unit="cells",
     )

@@ -91,12 +91,12 @@ def test_a_bridged_opening_is_spanned_as_in_the_whole_box():
 def test_surfaces_take_distances_beyond_the_band(ball, kind):
     """The double cover those two cells beyond its level. Where sides are told apart, regions start at up to half the
     bridging length; their neighbours are looked at, too."""
-    grid = fit_grid(ball.points, 80)
+    grid = fit_grid(ball.points, 88)
     spacing = np.median(ball.spacing) / grid.spacing
-    assert 2.5 < spacing < 4
+    assert 3.3 < spacing < 3.9
     found = band_for(Settings(band=3, surface=kind), ball, grid)
     if kind in ("none", "double"):
-        assert found == pytest.approx(3 if kind == "none" else 0.4 * spacing + 2)
+        assert found == pytest.approx(3 if kind == "none" else 1 + 0.5 * (spacing - 3) + 2)
     else:
         assert 1.5 * spacing + 1 < found < 1.5 * spacing + 2
     assert band_for(Settings(band=12, surface=kind), ball, grid) == 12

@@ -156,7 +156,7 @@ class TestAlone:
 @pytest.mark.parametrize("band", [None, 3.0])
 @pytest.mark.parametrize("count", [150, 300])
 def test_few_samples_leave_no_holes(count, band):
-    """At one cell, a tenth of their distance or less, there are holes between the two layers."""
+    """At one cell, a tenth of their distance, there are holes between the two layers."""
     surface = reconstruct(shapes.scattered_sphere(count), Settings(resolution=96, band=band)).surface
     assert [shapes.euler(piece) for piece in shapes.components(surface)] == [2, 2]
     assert set(surface.edge_counts()[1]) == {2}
