@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..field.blocks import each
-from ..field.grid import Grid
+from ..field.grid import PADDING, Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
 from .centring import centred
@@ -18,17 +18,20 @@ _ROUNDS = 2
 CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made background
 _SPARSE = 3.0  # cells, median local spacing above which the iso-surface is taken further off
 _RAISED = 0.5  # cells further for each cell of it above that
+_WITHIN = 0.75  # of the box's padding, at most
 _LONGEST_STEP = 2.0  # levels
 
 
 def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     """Cells from the surface at which its iso-surface is taken: `offset`, and half a cell more for every cell of local
-    spacing above three.
+    spacing above three, as far as the box leaves room.
 
     Patches of samples far apart do not quite meet, and an iso-surface closer than the cracks between them has holes: on
     `spot_sparse500` of the benchmarks its Euler number is -66 at 1 cell and -20 at the 2.5 that this is; 4 is right.
     """
-    return offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
+    raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
+    padding = (max(grid.shape) - 1) * PADDING / (1 + 2 * PADDING)
+    return max(offset, min(raised, _WITHIN * padding))
 
 
 def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:
