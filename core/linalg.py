@@ -1,8 +1,8 @@
 """Principal axes of many symmetric 3x3 tensors at once, in closed form; many small systems; sums of products.
 
-A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis. With another
-number of threads BLAS and LAPACK round differently, OpenBLAS even in systems of three equations, so what results depend
-on is summed and solved here.
+A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis. With another number of
+threads BLAS and LAPACK round differently, OpenBLAS even in systems of three equations, so what results depend on is
+summed and solved here.
 """
 
 import numpy as np

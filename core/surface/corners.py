@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..field.local_surface import LocalSurface
+from .mesh import edges_of
 from .planes import to_planes
 
 _TURN = 0.7  # largest cosine between the sides of sheets that form a corner
@@ -25,7 +26,7 @@ def into_corners(vertices, faces, side, surface: LocalSurface, cell: float, prog
     to the corner go first. They stay where that would take them far or off the surface, between sheets that run close
     for instance.
     """
-    low, high = _edges(faces, len(vertices))
+    (low, high), _ = edges_of(faces, len(vertices))
     way = vertices[high] - vertices[low]
     turn = np.einsum("ei,ei->e", side[low], side[high])
     concave = (turn > _FACING) & (turn < _TURN)
@@ -45,12 +46,6 @@ def into_corners(vertices, faces, side, surface: LocalSurface, cell: float, prog
     moved = vertices.copy()
     moved[row[chosen]] += step[chosen]
     return moved
-
-
-def _edges(faces, n):
-    """Both ends of the edges of faces (f,k), (e,) each."""
-    tail, head = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1).astype(np.int64)
-    return np.divmod(np.unique(np.minimum(tail, head) * n + np.maximum(tail, head)), n)
 
 
 def _closest_ends(low, high, length):

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.sparse import coo_matrix
 
+from .mesh import edges_of
+
 _ROUNDS, _DAMPING = 5, 0.5
 FLAT = 0.9  # least cosine between the normals of a vertex and of each face around it, where it may move
 
@@ -15,9 +17,7 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     surface bends within a face or two, at creases for instance.
     """
     n = len(vertices)
-    corner, ahead = (ends.reshape(-1).astype(np.int64) for ends in (faces, np.roll(faces, -1, axis=1)))
-    edge, count = np.unique(np.minimum(corner, ahead) * n + np.maximum(corner, ahead), return_counts=True)
-    tail, head = np.divmod(edge, n)
+    (tail, head), count = edges_of(faces, n)
     normal, least = vertex_normals(vertices, faces)
     free = ~fixed & (least >= FLAT)
     free[np.concatenate([tail[count != 2], head[count != 2]])] = False

@@ -43,10 +43,8 @@ class Mesh:
 
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
-        ends = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        n = len(self.vertices)
-        key, count = np.unique(ends[:, 0].astype(np.int64) * n + ends[:, 1], return_counts=True)
-        return np.stack(np.divmod(key, n), axis=1).astype(ends.dtype), count
+        ends, count = edges_of(self.faces, len(self.vertices))
+        return np.stack(ends, axis=1).astype(self.faces.dtype), count
 
     def border_loops(self) -> int:
         """Number of connected curves that the border edges (those of one face) form."""
@@ -60,3 +58,11 @@ class Mesh:
         """(f,) float64, square input units."""
         a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
         return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def edges_of(faces: np.ndarray, n: int) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Both ends, (e,) int64 each and the lower one first, of the edges of triangles or quads (f,k) over n vertices, in
+    order, and how many faces each edge has, (e,) int."""
+    tail, head = (ends.reshape(-1).astype(np.int64) for ends in (faces, np.roll(faces, -1, axis=1)))
+    key, count = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head), return_counts=True)
+    return np.divmod(key, n), count
