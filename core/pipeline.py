@@ -17,6 +17,7 @@ from .field.steps import NearBand
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
+from .parallel import in_order
 from .points import local_spacing, prepare_samples
 from .progress import Progress, watched
 from .reconstruction import Reconstruction
@@ -136,8 +137,9 @@ def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
     for number, (kind, mesh) in enumerate(surfaces.meshes.items()):
         facts[kind] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
         facts[kind] |= {"pieces_dropped": surfaces.dropped[kind]}
-        for more in progress.part(number / kinds, (number + 1) / kinds).each(_FACTS):
-            facts[kind] |= more(mesh)
+        asked = progress.part(number / kinds, (number + 1) / kinds).each(_FACTS)
+        for _, found in in_order(lambda fact, mesh=mesh: fact(mesh), asked):
+            facts[kind] |= found
     return facts
 
 

@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 
 from ..field.curvature import tangent_frames
 from ..linalg import outer, principal_axes, solve_positive
+from ..parallel import in_order
 from ..progress import Progress
 
 COEFFICIENTS = 6  # 1, x, y, xx, xy, yy
@@ -15,7 +16,7 @@ _ROUNDS = 2
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
-_CHUNK = 100_000  # neighbours
+_CHUNK = 30_000  # neighbours
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,14 @@ def fit_quadrics(points, rows, neighbours: int, progress=None) -> Quadrics:
     """
     tree = KDTree(points)
     found = Quadrics(np.empty((len(rows), 3)), np.empty(len(rows)), np.empty(len(rows)))
-    chunk = max(1, _CHUNK // neighbours)
-    for part in Progress.of(progress).chunks(len(rows), chunk):
-        distance, index = tree.query(points[rows[part]], k=neighbours, workers=-1)
-        offset = points[index] - points[rows[part], None]
-        found.step[part], found.height[part], found.leverage[part] = _fit(offset, distance)
+
+    def fit(part):
+        distance, index = tree.query(points[rows[part]], k=neighbours)
+        return _fit(points[index] - points[rows[part], None], distance)
+
+    chunks = Progress.of(progress).chunks(len(rows), max(1, _CHUNK // neighbours))
+    for part, piece in in_order(fit, chunks):
+        found.step[part], found.height[part], found.leverage[part] = piece
     return found
 
 

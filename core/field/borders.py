@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..parallel import in_order
 from ..progress import Progress
 
 GAP = np.radians(130)
@@ -24,7 +25,7 @@ _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
 _STEP = 0.35  # they may be off each other's plane by this share of their distance
 _FOLD = 0.87  # largest |n_i . n_j| of neighbours with a fold between them
 _FOLD_REACH = 1.5  # both are this close to the crease, local spacings
-_CHUNK = 8192  # samples
+_CHUNK = 2048  # samples
 _PAIRS = 500_000
 _STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
 
@@ -63,21 +64,20 @@ def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge
     neighbours      : (n,k) int, nearest first       tree : of the points
     bridge          : gaps up to this many local spacings are crossed
     """
-    progress, n = Progress.of(progress), len(points)
-    found = []
-    for part in progress.chunks(n, _CHUNK):
-        look = progress.part(part.start / n, part.stop / n)
-        rows = np.arange(n)[part]
-        found.append(
-            _find_rims(rows, points, normals, frames[part], spacing[part], neighbours[part], tree, bridge, look)
-        )
+
+    def find(part):
+        return _find_rims(part, points, normals, frames[part], spacing[part], neighbours[part], tree, bridge)
+
+    chunk = min(_CHUNK, max(1, _PAIRS // _within(bridge, len(points))))
+    chunks = Progress.of(progress).chunks(len(points), chunk)
+    found = [rims for _, rims in in_order(find, chunks)]
     return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
 
 
-def _find_rims(samples, points, normals, frames, spacing, neighbours, tree, bridge, progress):
+def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge):
     n, k = neighbours.shape
-    own, theirs = normals[samples], normals[neighbours]
-    step = points[neighbours] - points[samples, None]
+    own, theirs = normals[part], normals[neighbours]
+    step = points[neighbours] - points[part, None]
     flat = one_sheet(step, own[:, None], theirs)
     folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
     crease, limit = _creases(step, flat, folded, toward, line, spacing)
@@ -105,9 +105,7 @@ def _find_rims(samples, points, normals, frames, spacing, neighbours, tree, brid
     gap = (width > GAP) & (count > 0)
     distance = np.full(n, np.inf)
     rows = np.flatnonzero(gap)
-    distance[rows] = _distance_across(
-        samples[rows], points, normals, outward[rows], spacing[rows], tree, bridge, progress
-    )
+    distance[rows] = _distance_across(part.start + rows, outward[rows], spacing[rows], points, normals, tree, bridge)
     bridged = np.isfinite(distance)
     reach = np.where(bridged, np.maximum(DISC * spacing, BRIDGED * np.where(bridged, distance, 0.0)), 0.0)
     ends = np.einsum("nea,nai->nei", ends, frames)
@@ -207,19 +205,19 @@ def _creases(step, flat, folded, toward, line, spacing):
     return np.take_along_axis(toward, chosen[..., None], axis=1), limit
 
 
-def _distance_across(rows, points, normals, outward, spacing, tree, bridge, progress):
+def _within(bridge, n):
+    """How many samples, of n, there may be in a disc of the bridging length, with a margin."""
+    return min(n, int(4 * bridge**2) + 8)
+
+
+def _distance_across(rows, outward, spacing, points, normals, tree, bridge):
     """(m,) distance to the nearest sample of the sheet across the gap, inf where it is beyond the bridging length."""
-    within = min(len(points), int(4 * bridge**2) + 8)  # samples in a disc of that radius, with a margin
-    across = np.full(len(rows), np.inf)
-    for part in progress.chunks(len(rows), max(1, _PAIRS // within)):
-        own = rows[part]
-        distance, other = tree.query(points[own], k=within, workers=-1)
-        step = points[other] - points[own, None]
-        ahead = np.einsum("nki,ni->nk", step, outward[part]) > 0.8 * distance
-        near = (distance > 0) & (distance < bridge * spacing[part, None])
-        sheet = _aligned(normals[own, None], normals[other], 0.5) & _level(step, normals[own, None], normals[other])
-        across[part] = np.where(ahead & near & sheet, distance, np.inf).min(axis=1)
-    return across
+    distance, other = tree.query(points[rows], k=_within(bridge, len(points)))
+    step = points[other] - points[rows, None]
+    ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
+    near = (distance > 0) & (distance < bridge * spacing[:, None])
+    sheet = _aligned(normals[rows, None], normals[other], 0.5) & _level(step, normals[rows, None], normals[other])
+    return np.where(ahead & near & sheet, distance, np.inf).min(axis=1)
 
 
 def _past_edges(lateral, ends, margin):

@@ -3,13 +3,14 @@
 import numpy as np
 
 from ..linalg import solve_positive
+from ..parallel import in_order
 from ..progress import Progress
 
 _WIDTH = 1.5  # of the Gaussian weight, local spacings
 _ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting
 _ALIGNED = 0.5  # least |n_i . n_j| of neighbours that count
 _STIFFNESS = 1e-3
-_CHUNK = 16384  # samples
+_CHUNK = 2048  # samples
 
 
 def tangent_frames(normals: np.ndarray) -> np.ndarray:
@@ -29,8 +30,12 @@ def bending(points, normals, frames, spacing, neighbours, progress=None) -> np.n
     spacing.
     """
     bend = np.empty((len(points), 3, 3))
-    for part in Progress.of(progress).chunks(len(points), _CHUNK):
-        bend[part] = _bending(points, normals, part, frames[part], spacing[part], neighbours[part])
+
+    def fit(part):
+        return _bending(points, normals, part, frames[part], spacing[part], neighbours[part])
+
+    for part, piece in in_order(fit, Progress.of(progress).chunks(len(points), _CHUNK)):
+        bend[part] = piece
     return bend
 
 

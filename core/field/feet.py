@@ -12,6 +12,7 @@ from .local_surface import LocalSurface, Projection
 SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
 _SETTLED = 0.1  # cells, residual of a foot point that counts
 _RADIUS = 0.6  # cells, a foot point stands for a disc of this radius
+_CLOSE, _CLOSER = 0.5, 0.1  # cells: beyond the first from the surface, feet count that are this much closer
 _CHUNK = 1 << 17
 
 
@@ -32,17 +33,17 @@ class Feet:
 
     def squared(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Squared distances from x (3,...) float32 to the feet number `row` (...) themselves."""
-        return sum((x_a - centre[row]) ** 2 for x_a, centre in zip(x, self.centres, strict=True))
+        return sum((x_a - centre.take(row)) ** 2 for x_a, centre in zip(x, self.centres, strict=True))
 
     def distance(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Distances from x (3,...) float32 to the discs number `row` (...)."""
         height, squared = 0.0, 0.0
         for x_a, centre, normal in zip(x, self.centres, self.normals, strict=True):
-            offset = x_a - centre[row]
-            height = height + offset * normal[row]
+            offset = x_a - centre.take(row)
+            height = height + offset * normal.take(row)
             squared = squared + offset * offset
         height *= height
-        lateral = np.sqrt(np.maximum(squared - height, 0)) - self.radius[row]
+        lateral = np.sqrt(np.maximum(squared - height, 0)) - self.radius.take(row)
         return np.sqrt(height + np.maximum(lateral, 0) ** 2)
 
     def distances(self, x: np.ndarray) -> np.ndarray:
@@ -74,3 +75,14 @@ def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, prog
     normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
     radius = np.where(near.past_rim, 0.0, _RADIUS * grid.spacing)
     return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in (feet, normals, radius)))
+
+
+def no_farther_than_feet(projected: np.ndarray, to_feet: np.ndarray, grid: Grid) -> np.ndarray:
+    """Distances (m,) by projection, or those to the nearest foot where these are clearly less and the node is not right
+    beside the surface.
+
+    Patches that do not quite meet leave cracks, in which projections are too long and iso-surfaces have holes: on
+    `tjunction_5k` of the benchmarks that at one cell has the Euler number -42 without this and -4 with it; -6 is right.
+    """
+    least = np.maximum(to_feet + _CLOSER * grid.spacing, _CLOSE * grid.spacing)
+    return np.where(projected > least, to_feet, projected)

@@ -2,18 +2,19 @@
 with the box.
 
 Blocks, then groups of 4^3 and of 2^3 nodes are left out where their nearest sample is too far for the surface to come
-near; of what remains within two cells of the surface the distance is the projection's, and further out that to the feet
-of those nodes, both as in the whole box (see :mod:`.integration`).
+near; of what remains the distance next to the surface is the projection's, and further out that to the feet of the
+nodes there, both as in the whole box (see :mod:`.integration`).
 """
 
 import numpy as np
 
 from ..progress import Progress
 from .blocks import SIDE, Blocks, blocks_of, table_shape
-from .feet import Feet, settled_feet
+from .feet import Feet, no_farther_than_feet, settled_feet
 from .grid import CORNERS, Grid
-from .integration import BAND, sample_reach
+from .integration import BAND
 from .local_surface import LocalSurface, Projection
+from .near_nodes import sample_reach
 from .steps import NearBand
 
 _HALF = 0.5 * np.sqrt(3)  # cells, from the middle of a group of 2^3 nodes to each of them
@@ -35,7 +36,7 @@ def banded_field(surface: LocalSurface, grid: Grid, width: float, progress=None)
     node, near = _projected(surface, grid, corner, sample, progress.part(0.1, 0.6))
     feet = _feet(surface, grid, node, near, progress.part(0.6, 0.75))
     values = _around(surface, grid, width, corner, sample, feet, progress.part(0.75, 1.0))
-    values.put(node, near.distance)
+    values.put(node, no_farther_than_feet(near.distance, values.at(node), grid))
     return values.merged(), NearBand(node, near.step), feet
 
 

@@ -24,7 +24,7 @@ def poisson(
     Minimises the squared difference between the slope of u along every edge of the grid of every second node and the
     fused directions Y_f there, with u held softly at the known distances, by conjugate gradients preconditioned with
     the cosine transform of the Laplacian. Departs from the paper in the anchor: u = 0 at points off the grid alone is
-    slow to solve and no more accurate.
+    slow to solve and no more accurate. Nowhere is the distance more than that to the nearest sample.
 
     diffusion : where the directions come from. "kernel": projections onto the surface, which ends at rims; "grid": the
     paper's diffusion on the grid of all nodes, which knows no rims
@@ -35,8 +35,9 @@ def poisson(
     known = known[::STRIDE, ::STRIDE, ::STRIDE]
     coarse = Grid(grid.origin, STRIDE * grid.spacing, known.shape)
     nodes = coarse.positions(np.arange(known.size))
+    farthest, _ = surface.tree.query(nodes, workers=-1)
     if diffusion == "grid":
-        start, _ = surface.tree.query(nodes, workers=-1)
+        start = farthest
         check_held(surface.spacing, grid, start.max())
         samples = surface.points, surface.normals, surface.spacing
         direction = grid_axes(*samples, grid, STRIDE, progress.part(0.0, 0.5))
@@ -48,6 +49,7 @@ def poisson(
     anchor = np.where(np.isnan(known), 0.0, _ANCHOR)
     right = anchor * np.nan_to_num(known) - _divergence(direction)
     solution = _solve(anchor, right, start.reshape(known.shape), progress.part(0.5, 1.0))
+    solution = np.clip(solution, 0, farthest.reshape(known.shape))
     at = np.indices(grid.shape, np.float32) / STRIDE
     return map_coordinates(solution, at, order=1, mode="nearest", output=np.float32)
 

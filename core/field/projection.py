@@ -108,8 +108,7 @@ def _project(surface, x):
     rest = (member <= MEMBER) & (surface.confidence[near.sample] >= TRUSTED)
     for _ in range(_OTHER_SHEETS):
         rest &= apart < found[:, None]
-        row = np.flatnonzero(rest.any(axis=1))
-        anchor = rest[row].argmax(axis=1)
+        row, anchor = _first_of_rows(rest)
         other, other_step, other_rim, member = _onto_sheet(surface, near.rows(row), anchor)
         closer = other < found[row]
         chosen = row[closer]
@@ -137,13 +136,13 @@ def _nearby(surface, x):
 def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     """Samples (m,k) of a :class:`LocalSurface`, nearest first, and their distances, as queries (m,3) see them."""
     columns = surface.columns
-    spacing = columns.spacing[sample]
+    spacing = columns.spacing.take(sample)
     distance = np.maximum(distance, 1e-9 * spacing)
-    offset = np.stack([(x[:, a, None] - columns.points[a][sample]).astype(np.float32) for a in range(3)])
-    normals = np.stack([axis[sample] for axis in columns.normals])
+    offset = np.stack([(x[:, a, None] - columns.points[a].take(sample)).astype(np.float32) for a in range(3)])
+    normals = np.stack([axis.take(sample) for axis in columns.normals])
     height = _dot(offset, normals)
     lateral = offset - height * normals
-    xx, yy, zz, xy, xz, yz = (bend[sample] for bend in columns.bend)
+    xx, yy, zz, xy, xz, yz = (bend.take(sample) for bend in columns.bend)
     bent = np.stack([_dot(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
     above = (height - 0.5 * _dot(lateral, bent)) / np.sqrt(1 + _dot(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height)
@@ -176,7 +175,7 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     between = near.offset[:, every, anchor][:, :, None] - near.offset
     member = membership(between, near.normals[:, every, anchor], near.normals)
     weight = near.kernel * member
-    weight /= weight.max(axis=1, keepdims=True)
+    weight /= np.einsum("mk->m", weight)[:, None]
     axis = fused_axes(weight, near.pull, near.normals)
     cosine = _dot(near.normals, axis.T.astype(np.float32)[:, :, None])
     weight *= cosine
@@ -186,6 +185,13 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     covers[every, anchor] |= ~covers.any(axis=1)
     best = np.where(covers, near.beyond, np.inf).argmin(axis=1)
     return SheetFoot(tau, axis, near.beyond[every, best], near.outward[:, every, best].T, member)
+
+
+def _first_of_rows(marked):
+    """The rows of `marked` (m,k) bool with any mark, and the column of the first in each."""
+    row, column = np.divmod(np.flatnonzero(marked), marked.shape[1])
+    first = np.flatnonzero(np.diff(row, prepend=-1))
+    return row[first], column[first]
 
 
 def _dot(a, b):

@@ -6,16 +6,26 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Cancelled, Settings, reconstruct
+from core.field.feet import settled_feet
 from core.field.grid import fit_grid
 from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.progress import Progress
 from tests import shapes
 
 
 def off(run, true):
     """|u - d| in cells at every node."""
     return np.abs(run.field.values.ravel() - true(shapes.node_positions(run.field))) / run.field.spacing
+
+
+def scattered_junction(n):
+    """Samples uniform on a square and on half of another that stands on its middle line, and their normals."""
+    u, v = np.random.default_rng(0).uniform(-1, 1, (2, n))
+    upright = np.arange(n) % 3 == 0
+    points = np.where(upright[:, None], np.stack([u, 0 * u, abs(v)], axis=1), np.stack([u, v, 0 * u], axis=1))
+    return points, np.where(upright[:, None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
 
 
 def moebius_mesh(around=400, across=20, width=0.6):
@@ -142,6 +152,19 @@ class TestAlone:
         projected = surface.project(grid.positions(near)).distance
         np.testing.assert_allclose(values.flat[near], projected, atol=1e-6)
 
+    def test_nowhere_is_it_more_than_to_a_foot(self):
+        """Where sheets meet, patches do not quite, and projections between them are too long."""
+        points, normals = scattered_junction(1500)
+        surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
+        grid = fit_grid(points, 64)
+        values, near = distance_field(surface, grid)
+        projected = surface.project(grid.positions(near.node))
+        _, feet = settled_feet(surface, grid, near.node, projected, Progress())
+        found, bound = values.flat[near.node], feet.distances(grid.positions(near.node))
+        away = found > 0.7 * grid.spacing
+        assert ((found - bound)[away] < 0.2 * grid.spacing).all()
+        assert ((projected.distance - bound)[away] > 0.3 * grid.spacing).sum() > 20
+
     def test_reports_in_order_and_stops_when_told(self, stage):
         seen = []
         distance_field(*stage, progress=lambda fraction, _: seen.append(fraction))
@@ -162,4 +185,4 @@ def test_poisson_agrees_with_transport(points):
     assert 0 < apart.mean() < 0.4
     assert np.percentile(apart, 95) < 1.0
     near = run.field.values < run.field.spacing
-    np.testing.assert_array_equal(run.field.values[near], other.field.values[near])
+    assert np.mean(run.field.values[near] == other.field.values[near]) > 0.999  # but where feet close a crack

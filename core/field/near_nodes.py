@@ -1,0 +1,62 @@
+"""The nodes that may lie in the band around the surface, told from its patches without projecting anything."""
+
+import numpy as np
+
+from ..parallel import in_order
+from ..progress import Progress
+from .borders import DISC
+from .grid import Grid
+from .local_surface import LocalSurface
+
+_MARGIN = 0.25  # cells, for surfaces blended of patches that differ
+_PIECE = 1 << 16  # pairs of sample and node at a time
+
+
+def sample_reach(surface: LocalSurface) -> np.ndarray:
+    """How far the patch of each sample covers the surface, (n,), units of the samples."""
+    rims = surface.rims
+    return np.maximum(np.maximum(DISC * surface.spacing, rims.reach), rims.margin.max(axis=1))
+
+
+def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -> np.ndarray:
+    """Flat indices (b,), ascending, of the nodes that may lie within `width` cells of the surface: those as close, and
+    a quarter of a cell more, to the disc of any sample, thickened by what the patch bends away from it."""
+    at = (surface.points - grid.origin) / grid.spacing
+    reach = sample_reach(surface) / grid.spacing
+    bend = np.linalg.norm(surface.bend, axis=(1, 2)) * grid.spacing
+    patches = at, surface.normals, reach, np.minimum(0.5 * bend * reach**2, reach)
+    span = np.ceil(reach + width + _MARGIN).astype(np.int64)
+    pieces = []
+    for half in np.unique(span):
+        rows = np.flatnonzero(span == half)
+        pieces += [(half, part) for part in np.array_split(rows, -(-len(rows) * (2 * half + 1) ** 3 // _PIECE))]
+    found = np.zeros(grid.shape, bool)
+
+    def mark(piece):
+        half, rows = piece
+        found.flat[_around(grid, half, width + _MARGIN, *(each[rows] for each in patches))] = True
+
+    for _ in in_order(mark, Progress.of(progress).each(pieces)):
+        pass
+    return np.flatnonzero(found)
+
+
+def _around(grid, half, width, at, normals, reach, sag):
+    """Flat indices of nodes within `width` cells of discs, of those up to `half` nodes away along each axis."""
+    node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
+    offset = node - at[:, :, None]
+    height = np.abs(_outer_sum((normals[:, :, None] * offset).astype(np.float32)))
+    lateral = _outer_sum((offset**2).astype(np.float32)) - height**2
+    lateral = np.sqrt(np.maximum(lateral, 0, out=lateral), out=lateral)
+    reach, sag = (each.astype(np.float32)[:, None, None, None] for each in (reach, sag))
+    height, lateral = np.maximum(height - sag, 0, out=height), np.maximum(lateral - reach, 0, out=lateral)
+    near = height**2 + lateral**2 <= np.float32(width**2)
+    fits = (node >= 0) & (node < np.array(grid.shape)[:, None])
+    near &= fits[:, 0, :, None, None] & fits[:, 1, None, :, None] & fits[:, 2, None, None, :]
+    strides = np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
+    return _outer_sum(node * strides[:, None])[near]
+
+
+def _outer_sum(parts):
+    """Sums of one term per axis, (s,3,w) -> (s,w,w,w)."""
+    return parts[:, 0, :, None, None] + parts[:, 1, None, :, None] + parts[:, 2, None, None, :]
