@@ -26,7 +26,7 @@ _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.05, 8e-5, 3.1e-4
 _NEAR_NODE, _NODE = 2.8e-6, 2.7e-7
 _BAND_NEAR_NODE, _BAND_NODE = 5e-6, 2.4e-6
 _COVER, _SIDES = 1.7e-5, 6.6e-5  # for a squared cell of the surface: its double cover, and one with its sides told
-_PROBE = 0.0112
+_PROBE = 0.00387
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 2.9  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
@@ -116,7 +116,7 @@ def _at(resolution, estimate, grid, settings):
 def _probe():
     """Processor seconds of a small fixed piece of the usual work, the least of three, and how many times as long the
     three took by the clock as of the processor, which other work on the machine makes more."""
-    points = np.random.default_rng(0).random((4000, 3))
+    points = np.random.default_rng(0).random((1500, 3))
     begun, took = time.perf_counter(), []
     for _ in range(3):
         start = time.thread_time()

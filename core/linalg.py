@@ -23,11 +23,11 @@ def outer(vectors: np.ndarray) -> np.ndarray:
 def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit eigenvector of the largest eigenvalue, (m,6) -> (m,3), and all eigenvalues in falling order, (m,3).
 
-    Trigonometric solution of the characteristic cubic (O. K. Smith, Comm. ACM 4(4), 1961); the axis is the longest
-    cross product of two rows of A - lambda_1 I. Where the two largest eigenvalues coincide any axis of their plane may
-    come back; a multiple of the identity gives the x axis.
+    Trigonometric solution of the characteristic cubic (O. K. Smith, Comm. ACM 4(4), 1961). Every column of the adjugate
+    of A - lambda_1 I is along the axis; the one with the largest diagonal element is the longest. Where the two largest
+    eigenvalues coincide any axis of their plane may come back; a multiple of the identity gives the x axis.
     """
-    xx, yy, zz, xy, xz, yz = tensors.T
+    xx, yy, zz, xy, xz, yz = np.ascontiguousarray(tensors.T)
     mean = (xx + yy + zz) / 3
     dx, dy, dz = xx - mean, yy - mean, zz - mean
     spread = np.sqrt((dx * dx + dy * dy + dz * dz + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
@@ -40,22 +40,16 @@ def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     ax, ay, az = (xx - first) / safe, (yy - first) / safe, (zz - first) / safe
     bxy, bxz, byz = xy / safe, xz / safe, yz / safe
-    crosses = np.stack(
-        [
-            np.stack([bxy * byz - bxz * ay, bxz * bxy - ax * byz, ax * ay - bxy * bxy], axis=1),
-            np.stack([bxy * az - bxz * byz, bxz * bxz - ax * az, ax * byz - bxy * bxz], axis=1),
-            np.stack([ay * az - byz * byz, byz * bxz - bxy * az, bxy * byz - ay * bxz], axis=1),
-        ],
-        axis=1,
-    )
-    lengths = np.einsum("ijk,ijk->ij", crosses, crosses)
-    best = lengths.argmax(axis=1)
-    every = np.arange(len(tensors))
-    axes = crosses[every, best]
-    length = np.sqrt(lengths[every, best])
-    found = length > _DISTINCT
-    axes[found] /= length[found, None]
-    axes[~found] = _by_lapack(tensors[~found])
+    cxx, cyy, czz = ay * az - byz * byz, ax * az - bxz * bxz, ax * ay - bxy * bxy
+    cxy, cxz, cyz = bxz * byz - bxy * az, bxy * byz - bxz * ay, bxy * bxz - byz * ax
+    by_x = (cxx >= cyy) & (cxx >= czz)
+    by_y = cyy >= czz
+    columns = (cxx, cxy, cxz), (cxy, cyy, cyz), (cxz, cyz, czz)
+    axes = np.stack([np.where(by_x, x, np.where(by_y, y, z)) for x, y, z in columns], axis=1)
+    length = np.sqrt(np.einsum("mi,mi->m", axes, axes))
+    axes /= np.maximum(length, _DISTINCT)[:, None]
+    unclear = np.flatnonzero(length <= _DISTINCT)
+    axes[unclear] = _by_lapack(tensors[unclear])
     return axes, values
 
 

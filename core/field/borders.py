@@ -120,9 +120,9 @@ def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray
     sample : (m,k) int     lateral : (3,m,k) tangential offset from the sample     spacing : (m,k) of the sample
     Returns the distance (m,k) to the patch and the step (3,m,k) that leads out of it (its length is the distance).
     """
-    length = np.sqrt(np.einsum("imk,imk->mk", lateral, lateral))
+    length = np.sqrt(lateral[0] ** 2 + lateral[1] ** 2 + lateral[2] ** 2)
     radius = DISC * spacing
-    gap = np.nonzero(rims.gap[sample])
+    gap = np.nonzero(rims.gap.take(sample))
     owner = sample[gap]
     along = np.einsum("ig,gi->g", lateral[:, *gap], rims.outward[owner])
     open_side = along > length[gap] * rims.opening[owner]
@@ -135,7 +135,7 @@ def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray
     to_edge, edge_distance, past = _past_edges(lateral[:, *at_rim].T, rims.ends[owner], rims.margin[owner])
     _replace_where_worse(beyond, step, at_rim, past, to_edge * (past / np.where(past > 0, edge_distance, 1))[:, None])
 
-    at_crease = np.nonzero(np.isfinite(rims.limit[:, 0])[sample])
+    at_crease = np.nonzero(np.isfinite(rims.limit[:, 0]).take(sample))
     creased = sample[at_crease]
     across = np.einsum("im,mci->mc", lateral[:, *at_crease], rims.crease[creased])
     over = np.einsum("mc,mci->mi", np.maximum(across - rims.limit[creased], 0), rims.crease[creased])

@@ -1,15 +1,15 @@
 """From the local surface to distances in the whole box.
 
 Near the surface the blended projection distance is accurate and is kept, but where a foot point is closer: between
-patches that do not quite meet. Further out the paper solves a Poisson equation, see :mod:`poisson`. By default the distance is carried from the foot points of the near nodes instead, which
-errs less, most of all at the medial axis, and needs no linear solve: every node takes the foot of the nearest such node
-(an exact Euclidean distance transform finds it), compares it with the feet its neighbours hold, and keeps the closest
-(vector distance propagation; P.-E. Danielsson, Computer Graphics and Image Processing 14, 1980). The distance is then
-that to the disc of this foot alone: the least of many discs' is too small where the feet scatter.
+patches that do not quite meet. Further out the paper solves a Poisson equation, see :mod:`poisson`. By default the
+distance is carried from the foot points of the near nodes instead, which errs less, most of all at the medial axis, and
+needs no linear solve: every node takes the foot of the nearest such node (an exact Euclidean distance transform finds
+it), compares it with the feet its neighbours hold, and keeps the closest (vector distance propagation; P.-E.
+Danielsson, Computer Graphics and Image Processing 14, 1980). The distance is then that to the disc of this foot alone:
+the least of many discs' is too small where the feet scatter.
 """
 
 from functools import partial
-from itertools import repeat
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -71,7 +71,7 @@ def _transport(grid, node, feet, progress):
             pass
 
     by_slabs(begin, 0)
-    changed = None
+    changed = np.ones(grid.shape, bool)
     for turn in range(_ROUNDS):
         held = row.copy()
         by_slabs(partial(_take_closest, grid, feet, row, changed, held, squared), 1 + turn)
@@ -81,16 +81,12 @@ def _transport(grid, node, feet, progress):
 
 
 def _take_closest(grid, feet, row, changed, held, squared, slab):
-    """Where a foot of a neighbour, of those that changed if given, is closer than a node's own, put it into `held` and
-    its squared distance into `squared`."""
+    """Where a foot of a neighbour that changed is closer than a node's own, put it into `held` and its squared distance
+    into `squared`."""
     at, mine, best = _positions(grid, slab).reshape(3, -1), held[slab].reshape(-1), squared[slab].reshape(-1)
-    fresh = repeat(None) if changed is None else _neighbours(changed, slab)
-    for other, new in zip(_neighbours(row, slab), fresh):
+    for other, fresh in zip(_neighbours(row, slab), _neighbours(changed, slab), strict=True):
         other = other.reshape(-1)
-        tried = other != mine
-        if new is not None:
-            tried &= new.reshape(-1)
-        tried = np.flatnonzero(tried)
+        tried = np.flatnonzero(fresh.reshape(-1) & (other != mine))
         other = other[tried]
         found = feet.squared(at.take(tried, axis=1), other)
         closer = found < best[tried]

@@ -30,31 +30,34 @@ def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -
     for half in np.unique(span):
         rows = np.flatnonzero(span == half)
         pieces += [(half, part) for part in np.array_split(rows, -(-len(rows) * (2 * half + 1) ** 3 // _PIECE))]
-    found = np.zeros(grid.shape, bool)
+    rim = int(span.max())  # nodes, around the box, so that none needs asking whether it is inside
+    found = np.zeros(np.array(grid.shape) + 2 * rim, bool)
 
     def mark(piece):
         half, rows = piece
-        found.flat[_around(grid, half, width + _MARGIN, *(each[rows] for each in patches))] = True
+        found.flat[_around(found.shape, rim, half, width + _MARGIN, *(each[rows] for each in patches))] = True
 
     for _ in in_order(mark, Progress.of(progress).each(pieces)):
         pass
-    return np.flatnonzero(found)
+    return np.flatnonzero(found[rim:-rim, rim:-rim, rim:-rim])
 
 
-def _around(grid, half, width, at, normals, reach, sag):
-    """Flat indices of nodes within `width` cells of discs, of those up to `half` nodes away along each axis."""
+def _around(shape, rim, half, width, at, normals, reach, sag):
+    """Flat indices, in a box of `shape` with `rim` nodes more on every side, of the nodes within `width` cells of
+    discs, of those up to `half` nodes away along each axis."""
     node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
     offset = node - at[:, :, None]
-    height = np.abs(_outer_sum((normals[:, :, None] * offset).astype(np.float32)))
-    lateral = _outer_sum((offset**2).astype(np.float32)) - height**2
-    lateral = np.sqrt(np.maximum(lateral, 0, out=lateral), out=lateral)
     reach, sag = (each.astype(np.float32)[:, None, None, None] for each in (reach, sag))
-    height, lateral = np.maximum(height - sag, 0, out=height), np.maximum(lateral - reach, 0, out=lateral)
-    near = height**2 + lateral**2 <= np.float32(width**2)
-    fits = (node >= 0) & (node < np.array(grid.shape)[:, None])
-    near &= fits[:, 0, :, None, None] & fits[:, 1, None, :, None] & fits[:, 2, None, None, :]
-    strides = np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
-    return _outer_sum(node * strides[:, None])[near]
+    height = _outer_sum((normals[:, :, None] * offset).astype(np.float32))
+    lateral = _outer_sum((offset**2).astype(np.float32))
+    lateral -= height * height
+    np.sqrt(np.maximum(lateral, 0, out=lateral), out=lateral)
+    off = np.maximum(np.abs(height, out=height) - sag, 0)
+    off *= off
+    lateral = np.maximum(np.subtract(lateral, reach, out=lateral), 0, out=lateral)
+    off += lateral * lateral
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    return _outer_sum((node + rim) * strides[:, None])[off <= np.float32(width**2)]
 
 
 def _outer_sum(parts):

@@ -4,9 +4,11 @@ Where vertices lie on the surface, faces are chords: all of them inside of a bal
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from ..parallel import in_order
 from .evening import FLAT, vertex_normals
 from .mesh import Mesh
 
@@ -23,11 +25,11 @@ def centred(mesh: Mesh) -> Mesh:
     the mesh bends within a face or two, at creases for instance; faces there count as flat.
     """
     vertices, faces = mesh.vertices, mesh.faces
-    normal, least = vertex_normals(vertices, faces)
-    edges, counts = mesh.edge_counts()
+    looks = partial(vertex_normals, vertices, faces), mesh.edge_counts, mesh.face_areas
+    (normal, least), (edges, counts), area = (found for _, found in in_order(lambda look: look(), looks))
     free = least >= FLAT
     free[edges[counts != 2]] = False
-    off, area = np.zeros(len(faces)), mesh.face_areas()
+    off = np.zeros(len(faces))
     for a, b in zip(faces.T, np.roll(faces, -1, axis=1).T, strict=True):
         off += np.einsum("fi,fi->f", vertices[b] - vertices[a], normal[b] - normal[a]) / 18
     off[(least < FLAT)[faces].any(axis=1)] = 0.0

@@ -31,8 +31,9 @@ def test_they_are_those_that_a_projection_of_every_node_finds_and_few_more(sampl
 
 
 def test_nodes_outside_the_box_are_none():
+    """A box that holds the samples with no room to spare."""
     surface = ball()
-    grid = Grid(np.array([0.5, -0.3, -0.3]), 0.05, (12, 13, 14))
+    grid = Grid(np.full(3, -1.0), 0.05, (41, 41, 41))
     found = near_nodes(surface, grid, WIDTH)
     distance = surface.project(grid.positions(np.arange(np.prod(grid.shape)))).distance / grid.spacing
     assert found.max() < np.prod(grid.shape)
