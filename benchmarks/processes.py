@@ -1,6 +1,8 @@
 """Work in processes of its own: its memory is its own, and what crashes or takes too long there ends there."""
 
+import ctypes
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -8,6 +10,7 @@ from multiprocessing import get_context
 
 _WARM = "forkserver" if sys.platform != "win32" else "spawn"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+_PARENT_DEATH_SIGNAL = 1  # option of Linux's prctl
 _LOADED_ONCE = ["open3d", "benchmarks.measure_peers"]
 
 
@@ -69,7 +72,15 @@ def _run(context, function, arguments, limit):
 
 
 def _report(sender, function, arguments):
+    _end_with_parent()
     try:
         sender.send((True, function(*arguments)))
     except Exception as error:  # noqa: BLE001 - whatever it is, the caller is to hear of it
         sender.send((False, f"{type(error).__name__}: {error}"))
+
+
+def _end_with_parent():
+    """Have this process killed when the one that began it is gone, even in the midst of a library's loop; Linux alone
+    can do that, elsewhere the loop ends first."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)

@@ -28,7 +28,7 @@ from .repeatability import differences
 PEER_LIMIT = 400.0  # seconds, all variants together
 FINE_FROM = 100_000  # points of a case from which our double cover is measured on a grid twice as fine, too
 TWICE_UP_TO = 3_000  # points of a case that is measured twice where times are repeated
-_MISSING = "not measured"
+_MISSING, _TOO_SLOW = "not measured", "too slow"
 
 
 @dataclass(frozen=True)
@@ -124,17 +124,28 @@ class _Parts:
                 groups.setdefault(peer.prepare, []).append(name)
         for names in groups.values():
             given = names, self.path, self.sampling, self.plan.repeats
-            run = partial(run_warm, measure_peers, *given, limit=PEER_LIMIT)
+            run = partial(_in_time_or_not, run_warm, measure_peers, *given, limit=PEER_LIMIT)
             first_step = PEERS[names[0]].first_step
             try:
                 if first_step in too_slow:
                     raise too_slow[first_step]
-                measured |= self.measure(f"{'+'.join(names)}{suffix}", kept.PEERS, run)
+                found = self.measure(f"{'+'.join(names)}{suffix}", kept.PEERS, run)
+                if _TOO_SLOW in found:
+                    raise TooSlow(found[_TOO_SLOW])
+                measured |= found
             except Failed as error:
                 measured |= {name: {"error": str(error)} for name in names}
                 if isinstance(error, TooSlow) and first_step:
                     too_slow[first_step] = error
         return measured
+
+
+def _in_time_or_not(run, *arguments, **limit):
+    """What `run` returns, or that it was too slow, which is worth keeping as well."""
+    try:
+        return run(*arguments, **limit)
+    except TooSlow as error:
+        return {_TOO_SLOW: str(error)}
 
 
 def _result(parts):

@@ -84,3 +84,19 @@ def test_what_starts_as_a_slow_peer_does_is_not_waited_for(error, paths, calls, 
     slow = {name for name in found if found[name] == {"error": "no"}}
     assert slow == {"poisson", "trimmed", "alpha"} | ({"pivoting"} if error is TooSlow else set())
     assert ["pivoting"] not in begun if error is TooSlow else ["pivoting"] in begun
+
+
+def test_a_peer_that_was_too_slow_is_not_tried_again_and_one_that_failed_is(paths, calls, monkeypatch, tmp_path):
+    def run_warm(_, names, *__, limit):
+        begun.append(names)
+        raise (TooSlow if names[0] == "alpha" else Failed)("no")
+
+    begun, plan = [], run.Plan(Settings(), peers=True, keep=tmp_path / "kept")
+    monkeypatch.setattr(run, "run_warm", run_warm)
+    monkeypatch.setattr("benchmarks.peers.find_spec", lambda module: True)
+    before = next(run.run_cases(paths[:1], "uniform", plan))
+    tried = begun.copy()
+    assert ["alpha"] in tried
+    begun.clear()
+    assert next(run.run_cases(paths[:1], "uniform", plan)) == before
+    assert begun == [names for names in tried if names != ["alpha"]]
