@@ -1,16 +1,15 @@
 """Work in processes of its own: its memory is its own, and what crashes or takes too long there ends there."""
 
-import ctypes
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from threading import Thread
 
 _WARM = "forkserver" if sys.platform != "win32" else "spawn"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-_PARENT_DEATH_SIGNAL = 1  # option of Linux's prctl
 _LOADED_ONCE = ["open3d", "benchmarks.measure_peers"]
 
 
@@ -80,7 +79,11 @@ def _report(sender, function, arguments):
 
 
 def _end_with_parent():
-    """Have this process killed when the one that began it is gone, even in the midst of a library's loop; Linux alone
-    can do that, elsewhere the loop ends first."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    """Have this process end when the one that asked for it is gone, unless a library holds the interpreter just then.
+    That of a killed run would go on for minutes otherwise, in the way of the next."""
+
+    def watch():
+        parent_process().join()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    Thread(target=watch, daemon=True).start()

@@ -24,7 +24,7 @@ def test_a_crash_and_an_endless_run_end():
         run_warm(time.sleep, 60, limit=1)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a process left alone ends when it is done")
+@pytest.mark.skipif(sys.platform != "linux", reason="asks for the state of a process in /proc")
 @pytest.mark.parametrize("how", ["run_fresh(os.system, {!r})", "run_warm(os.system, {!r}, limit=60)"])
 def test_none_is_left_at_work_when_the_run_is_killed(how, tmp_path):
     """Its number is written by a shell that it runs."""
