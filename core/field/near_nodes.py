@@ -1,6 +1,7 @@
 """The nodes that may lie in the band around the surface, told from its patches without projecting anything."""
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from ..parallel import in_order
 from ..progress import Progress
@@ -10,6 +11,8 @@ from .local_surface import LocalSurface
 
 _MARGIN = 0.25  # cells, for surfaces blended of patches that differ
 _PIECE = 1 << 16  # pairs of sample and node at a time
+_OFTEN = 40.0  # times that each node is asked, on average; a distance transform is quicker then
+_WIDE = 0.25  # of the box, that the patch of a sample reaches
 
 
 def sample_reach(surface: LocalSurface) -> np.ndarray:
@@ -20,12 +23,16 @@ def sample_reach(surface: LocalSurface) -> np.ndarray:
 
 def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -> np.ndarray:
     """Flat indices (b,), ascending, of the nodes that may lie within `width` cells of the surface: those as close, and
-    a quarter of a cell more, to the disc of any sample, thickened by what the patch bends away from it."""
+    a quarter of a cell more, to the disc of any sample, thickened by what the patch bends away from it. Where the discs
+    of dense or of few samples would have every node asked many times, all nodes as close to a ball around the disc."""
+    progress, reach = Progress.of(progress), sample_reach(surface) / grid.spacing
+    span = np.ceil(reach + width + _MARGIN).astype(np.int64)
+    times_asked = np.sum((2.0 * span + 1) ** 3) / np.prod(grid.shape)
+    if times_asked > _OFTEN or span.max() > _WIDE * max(grid.shape):
+        return _within_balls(surface, grid, reach + width, progress)
     at = (surface.points - grid.origin) / grid.spacing
-    reach = sample_reach(surface) / grid.spacing
     bend = np.linalg.norm(surface.bend, axis=(1, 2)) * grid.spacing
     patches = at, surface.normals, reach, np.minimum(0.5 * bend * reach**2, reach)
-    span = np.ceil(reach + width + _MARGIN).astype(np.int64)
     pieces = []
     for half in np.unique(span):
         rows = np.flatnonzero(span == half)
@@ -37,9 +44,19 @@ def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -
         half, rows = piece
         found.flat[_around(found.shape, rim, half, width + _MARGIN, *(each[rows] for each in patches))] = True
 
-    for _ in in_order(mark, Progress.of(progress).each(pieces)):
+    for _ in in_order(mark, progress.each(pieces)):
         pass
     return np.flatnonzero(found[rim:-rim, rim:-rim, rim:-rim])
+
+
+def _within_balls(surface, grid, radius, progress):
+    """Flat indices of the nodes within `radius` (n,), cells, of the nodes next to the nearest samples."""
+    home = grid.nearest_nodes(surface.points)
+    widest = np.zeros(grid.shape, np.float32)
+    np.maximum.at(widest.reshape(-1), home, (radius + 0.5 * np.sqrt(3)).astype(np.float32))
+    progress(0.0)
+    away, nearest = distance_transform_edt(widest == 0, return_indices=True)
+    return np.flatnonzero(away <= widest[tuple(nearest)])
 
 
 def _around(shape, rim, half, width, at, normals, reach, sag):
