@@ -5,11 +5,13 @@ that crossings of one are not taken for crossings of the other.
 """
 
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import CHUNK, MEMBER, TRUSTED, seen_from, sheet_foot
+from ..parallel import in_order
 from ..progress import Progress
 
 _NEAREST = 16  # samples of a node
@@ -68,11 +70,13 @@ def sheets_near(
     A sheet that a node's neighbour knows and the node itself does not is told to the node.
     """
     progress = Progress.of(progress)
-    found = [_sheets_of(surface, x, part) for part in progress.chunks(len(x), CHUNK)]
+    chunks = progress.chunks(len(x), CHUNK)
+    found = [sheets for _, sheets in in_order(lambda part: _sheets_of(surface, x, part), chunks)]
     sheets = found[0].joined(*found[1:])
     sheets = _distinct(sheets[np.abs(sheets.tau) <= REACH * cell], surface, len(x), cell)
     for _ in range(_ROUNDS):
-        told = [_told(sheets, surface, x, towards, cell) for towards in neighbours]
+        tell = partial(_told, sheets, surface, x, cell)
+        told = [found for _, found in in_order(tell, neighbours)]
         sheets = _distinct(sheets.joined(*told), surface, len(x), cell)
     return sheets
 
@@ -88,7 +92,7 @@ def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray
 
 def _sheets_of(surface, x, part):
     part = np.arange(part.start, part.stop)
-    distance, sample = surface.tree.query(x[part], k=min(_NEAREST, len(surface.points)), workers=-1)
+    distance, sample = surface.tree.query(x[part], k=min(_NEAREST, len(surface.points)))
     rest = surface.confidence[sample] >= TRUSTED
     rest[:, 0] |= ~rest.any(axis=1)
     normals = surface.normals[sample]
@@ -126,7 +130,7 @@ def _distinct(sheets, surface, nodes, cell):
     return sheets[~dropped]
 
 
-def _told(sheets, surface, x, towards, cell):
+def _told(sheets, surface, x, cell, towards):
     """What the neighbours of nodes do not know of the nodes' sheets, as pairs of the neighbours."""
     first, count = sheets.span(len(x))
     pair = np.flatnonzero((towards[sheets.node] >= 0) & (sheets.beyond <= cell))
