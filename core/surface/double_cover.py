@@ -27,7 +27,7 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     spacing above three, as far as the box leaves room.
 
     Patches of samples far apart do not quite meet, and an iso-surface closer than the cracks between them has holes: on
-    `spot_sparse500` of the benchmarks its Euler number is -66 at 1 cell and -20 at the 2.5 that this is; 4 is right.
+    `spot_sparse500` of the benchmarks its Euler number is -48 at 1 cell and -18 at the 2.5 that this is; 4 is right.
     """
     raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
     padding = (max(grid.shape) - 1) * PADDING / (1 + 2 * PADDING)
