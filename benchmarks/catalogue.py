@@ -67,6 +67,7 @@ CASES = {
     "tjunction_5k": Recipe("non-manifold", junctions.t_junction, 5_000, quick=True),
     "candy_10k": Recipe("non-manifold", junctions.candy, 10_000),
     "toiletpaper_10k": Recipe("non-manifold", junctions.toilet_paper, 10_000, quick=True),
+    "box_axis_10k": Recipe("medial axis", junctions.box_axis, 10_000),
     "moebius_5k": Recipe("non-orientable", one_sided.moebius, 5_000, quick=True),
     "klein_10k": Recipe("non-orientable", one_sided.klein, 10_000),
     "boy_10k": Recipe("non-orientable", one_sided.boy, 10_000),

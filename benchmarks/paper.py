@@ -38,7 +38,7 @@ _LIKE_NAMED = {
 _CATEGORY = {
     "indoor scenes": lambda found: found["category"] == "indoor scene",
     "clothes": lambda found: found["case"].startswith("cloth_10k"),
-    "medial axis": lambda found: False,
+    "medial axis": lambda found: found["category"] == "medial axis",
     "non-manifold": lambda found: found["category"] == "non-manifold",
     "open": lambda found: found["category"] == "open",
     "high genus": lambda found: found["category"] == "high genus",

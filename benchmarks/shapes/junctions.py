@@ -1,5 +1,6 @@
 """Sheets that meet along lines, which no manifold can."""
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -50,6 +51,26 @@ def paper_plane() -> Surface:
         triangles += [[tail, nose, fold], [tail, fold, corner], [fold, corner, tip]]
     faces = np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3)
     return from_mesh(Mesh(np.array(triangles, float).reshape(-1, 3), faces), line(tail, nose))
+
+
+def box_axis() -> Surface:
+    """The medial axis of a box with half sides a > b > c: a rectangle in its middle plane, and from each of the box's
+    edges a sheet at 45 degrees, up to the depth c; three sheets meet along twelve lines."""
+    a, b, c = 1.2, 0.8, 0.45
+    sides = (-1, 1)
+    sheets = [[(-a + c, -b + c, 0), (a - c, -b + c, 0), (a - c, b - c, 0), (-a + c, b - c, 0)]]
+    for s, t in itertools.product(sides, sides):
+        sheets += [
+            [(s * a, -b, t * c), (s * a, b, t * c), (s * (a - c), b - c, 0), (s * (a - c), -b + c, 0)],
+            [(-a, s * b, t * c), (a, s * b, t * c), (a - c, s * (b - c), 0), (-a + c, s * (b - c), 0)],
+            [(s * a, t * b, -c), (s * a, t * b, c), (s * (a - c), t * (b - c), 0)],
+        ]
+    triangles = [(p[0], p[k], p[k + 1]) for p in sheets for k in range(1, len(p) - 1)]
+    corners = sheets[0]
+    inner = [line(p, q) for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    outer = [line((s * a, t * b, u * c), (s * (a - c), t * (b - c), 0)) for s, t, u in itertools.product(*[sides] * 3)]
+    faces = np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3)
+    return from_mesh(Mesh(np.array(triangles, float).reshape(-1, 3), faces), np.concatenate([*inner, *outer]))
 
 
 def candy() -> Surface:

@@ -11,6 +11,8 @@ other, and that line is where the patch ends, unless the sheet goes on straight 
 from dataclasses import dataclass, fields
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ..parallel import in_order
@@ -19,7 +21,7 @@ from ..progress import Progress
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
-BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
+_BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
 
 _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
 _STEP = 0.35  # they may be off each other's plane by this share of their distance
@@ -105,9 +107,10 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     gap = (width > GAP) & (count > 0)
     distance = np.full(n, np.inf)
     rows = np.flatnonzero(gap)
-    distance[rows] = _distance_across(part.start + rows, outward[rows], spacing[rows], points, normals, tree, bridge)
+    distance[rows], _ = across_gaps(part.start + rows, outward[rows], spacing[rows], points, normals, tree, bridge)
     bridged = np.isfinite(distance)
-    reach = np.where(bridged, np.maximum(DISC * spacing, BRIDGED * np.where(bridged, distance, 0.0)), 0.0)
+    reach = np.zeros(n)
+    reach[bridged] = bridged_reach(distance[bridged], spacing[bridged])
     ends = np.einsum("nea,nai->nei", ends, frames)
     beside = np.take_along_axis(neighbours, bounding, axis=1)
     margin = np.repeat(RIM * spacing[:, None], 3, axis=1)
@@ -210,14 +213,32 @@ def _within(bridge, n):
     return min(n, int(4 * bridge**2) + 8)
 
 
-def _distance_across(rows, outward, spacing, points, normals, tree, bridge):
-    """(m,) distance to the nearest sample of the sheet across the gap, inf where it is beyond the bridging length."""
+def across_gaps(rows, outward, spacing, points, normals, tree: KDTree, bridge: float):
+    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings away:
+    its distance (m,), inf where there is none, and its number (m,)."""
     distance, other = tree.query(points[rows], k=_within(bridge, len(points)))
     step = points[other] - points[rows, None]
     ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
     near = (distance > 0) & (distance < bridge * spacing[:, None])
     sheet = _aligned(normals[rows, None], normals[other], 0.5) & _level(step, normals[rows, None], normals[other])
-    return np.where(ahead & near & sheet, distance, np.inf).min(axis=1)
+    distance = np.where(ahead & near & sheet, distance, np.inf)
+    nearest = np.arange(len(rows)), distance.argmin(axis=1)
+    return distance[nearest], other[nearest]
+
+
+def bridged_reach(distance, spacing) -> np.ndarray:
+    """How far patches cover gaps of width `distance` (m,) that are bridged, (m,)."""
+    return np.maximum(DISC * spacing, _BRIDGED * distance)
+
+
+def chain_lengths(rims: Rims, marked) -> np.ndarray:
+    """Of the samples marked, (n,) bool, how many there are in a row with each, one bounding the next one's gap, (n,);
+    1 for those that are not marked."""
+    n = len(marked)
+    tail, head = np.repeat(np.flatnonzero(marked), 2), rims.beside[marked].reshape(-1)
+    tail, head = tail[marked[head]], head[marked[head]]
+    _, chain = connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)
+    return np.bincount(chain)[chain]
 
 
 def _past_edges(lateral, ends, margin):

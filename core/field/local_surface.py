@@ -12,6 +12,7 @@ from .borders import Rims, find_rims
 from .curvature import bending, tangent_frames
 from .projection import Projection, project
 from .rim_lines import with_rim_lines
+from .sampling_gaps import with_sampling_gaps_bridged
 
 NEIGHBOURS = 16  # of a sample, that its patch is fitted to
 _CHUNK = 16384  # samples
@@ -78,5 +79,6 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     neighbours = patch_neighbours(tree, progress.part(0.0, 0.1))
     bend = bending(points, normals, frames, spacing, neighbours, progress.part(0.1, 0.5))
     rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, progress.part(0.5, 0.9))
+    rims = with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, bridge)
     rims = with_rim_lines(rims, points, normals, spacing, tree, progress.part(0.9, 1.0))
     return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)

@@ -10,12 +10,10 @@ a gap.
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ..progress import Progress
-from .borders import RIM, Rims, one_sheet
+from .borders import RIM, Rims, chain_lengths, one_sheet
 
 _CHAIN = 12  # least number of samples in a row that are a rim; fewer are gaps in the sampling
 _WINDOW = 5.0  # local spacings to either side of a sample, how far its line looks
@@ -39,7 +37,8 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     points, normals : (n,3) float64     spacing : (n,) local spacing     tree : of the points
     """
     progress = Progress.of(progress)
-    row = _in_chains(rims)
+    rim = rims.gap & ~rims.bridged
+    row = np.flatnonzero(rim & (chain_lengths(rims, rim) >= _CHAIN))
     if not len(row):
         return rims
     parts = [row[part] for part in progress.chunks(len(row), _CHUNK)]
@@ -88,16 +87,6 @@ class _Lines:
 
 def _margin(height):
     return np.clip(height + _BEYOND, 0, _FARTHEST)
-
-
-def _in_chains(rims):
-    """Samples at rims that are neighbours of at least so many others along them."""
-    n = len(rims.gap)
-    rim = rims.gap & ~rims.bridged
-    tail, head = np.repeat(np.flatnonzero(rim), 2), rims.beside[rim].reshape(-1)
-    tail, head = tail[rim[head]], head[rim[head]]
-    _, chain = connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)
-    return np.flatnonzero(rim & (np.bincount(chain)[chain] >= _CHAIN))
 
 
 def _lines(row, outward, points, normals, spacing, tree):

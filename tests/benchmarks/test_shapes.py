@@ -35,6 +35,7 @@ def off_torus(points):
         (one_sided.moebius, 0, 1, 0),
         (junctions.t_junction, 1, 1, 1),
         (junctions.paper_plane, 1, 1, 1),
+        (junctions.box_axis, 1, 1, 12),
         (junctions.fish, 2, 3, 198),
         (junctions.strawberry, 2, 1, 360),
     ],

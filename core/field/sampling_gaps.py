@@ -1,0 +1,52 @@
+"""Gaps in the sampling that are wider than the bridging length, told apart from openings of the surface.
+
+Among many random samples some leave a disc of four local spacings across empty. Around an opening the samples at its
+rim follow one another; around a gap in the sampling few look across a wide angle without any, and the patches to its
+two sides meet over it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from .borders import Rims, across_gaps, bridged_reach, chain_lengths
+
+_FEW = 5  # samples in a row that a gap in the sampling may have at its rim
+_WIDER = 1.5  # bridging lengths, the widest of them
+_APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
+
+
+def with_sampling_gaps_bridged(rims: Rims, points, normals, bend, spacing, tree: KDTree, bridge: float) -> Rims:
+    """The rims with gaps in the sampling bridged that are up to half as wide again as `bridge` local spacings.
+
+    points, normals : (n,3) float64     bend : (n,3,3) of the patches     spacing : (n,) local spacing
+    """
+    few = chain_lengths(rims, rims.gap) <= _FEW
+    row = np.flatnonzero(rims.gap & ~rims.bridged & few)
+    distance, other = across_gaps(row, rims.outward[row], spacing[row], points, normals, tree, _WIDER * bridge)
+    found = np.isfinite(distance) & few[other]
+    row, other, distance = row[found], other[found], distance[found]
+    met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance
+    row, distance = row[met], distance[met]
+    bridged, reach = rims.bridged.copy(), rims.reach.copy()
+    bridged[row], reach[row] = True, bridged_reach(distance, spacing[row])
+    return replace(rims, bridged=bridged, reach=reach)
+
+
+def _apart_halfway(row, other, points, normals, bend):
+    """How far apart the patches of two samples each lie halfway between them, along their mean normal, (m,)."""
+    own, theirs = normals[row], normals[other]
+    same = np.where(np.einsum("mi,mi->m", own, theirs) < 0, -1.0, 1.0)
+    middle = 0.5 * (points[row] + points[other])
+    apart = _foot(middle, points[row], own, bend[row]) - _foot(middle, points[other], theirs, bend[other])
+    mean = own + same[:, None] * theirs
+    return np.abs(np.einsum("mi,mi->m", apart, mean)) / np.linalg.norm(mean, axis=1)
+
+
+def _foot(x, points, normals, bend):
+    """Where the patches of points (m,3) lie below or above x (m,3)."""
+    offset = x - points
+    lateral = offset - np.einsum("mi,mi->m", offset, normals)[:, None] * normals
+    height = 0.5 * np.einsum("mi,mij,mj->m", lateral, bend, lateral)
+    return points + lateral + height[:, None] * normals

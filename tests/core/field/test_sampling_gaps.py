@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core.field.borders import find_rims
+from core.field.curvature import bending, tangent_frames
+from core.field.local_surface import patch_neighbours
+from core.field.sampling_gaps import with_sampling_gaps_bridged
+from core.points import local_spacing
+from tests import shapes
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def before_and_after(points, normals, bend_times=1.0):
+    normals = np.broadcast_to(normals, points.shape)
+    spacing, tree = local_spacing(points), KDTree(points)
+    frames, neighbours = tangent_frames(normals), patch_neighbours(tree)
+    bend = bend_times * bending(points, normals, frames, spacing, neighbours)
+    rims = find_rims(points, normals, frames, spacing, neighbours, tree, 3.0)
+    return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, 3.0), spacing
+
+
+def open_rim(rims):
+    return rims.gap & ~rims.bridged
+
+
+def random_sphere(count, seed=0):
+    points = np.random.default_rng(seed).normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def test_random_samples_of_a_closed_surface_leave_gaps_and_nearly_all_are_bridged():
+    points = random_sphere(20_000)
+    before, after, spacing = before_and_after(points, points)
+    assert open_rim(before).sum() > 50
+    assert open_rim(after).sum() < 0.15 * open_rim(before).sum()
+    newly = after.bridged & ~before.bridged
+    assert (after.reach[newly] >= spacing[newly]).all()
+    np.testing.assert_array_equal(after.reach[before.bridged], before.reach[before.bridged])
+
+
+def test_the_rim_of_a_random_disc_stays_open_and_gaps_inside_are_bridged(random):
+    turn, radius = random.uniform(0, 2 * np.pi, 5000), np.sqrt(random.random(5000))
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
+    before, after, spacing = before_and_after(points, UP)
+    inside = 1 - radius > 2 * spacing
+    assert open_rim(before)[~inside].sum() > 150
+    np.testing.assert_array_equal(after.bridged[~inside], before.bridged[~inside])
+    assert open_rim(after)[inside].sum() < 0.5 * open_rim(before)[inside].sum()
+
+
+@pytest.mark.parametrize("width", [3.2, 4.0])
+def test_a_slit_wider_than_the_bridging_length_stays_open(width, random):
+    points = np.pad(random.uniform(-1, 1, (4000, 2)), ((0, 0), (0, 1)))
+    side = 0.5 * width * np.median(local_spacing(points))
+    points[:, 0] += np.sign(points[:, 0]) * side
+    before, after, spacing = before_and_after(points, UP)
+    beside = open_rim(before) & (np.abs(points[:, 0]) < side + 0.6 * spacing) & (np.abs(points[:, 1]) < 0.8)
+    assert beside.sum() > 10
+    assert not after.bridged[beside].any()
+
+
+def test_a_round_hole_twice_as_wide_as_the_bridging_length_stays_open():
+    points = shapes.holed_square(1000, radius=0.2)
+    before, after, spacing = before_and_after(points, UP)
+    around = open_rim(before) & (np.linalg.norm(points, axis=1) < 0.3)
+    assert around.sum() > 5
+    assert 6 * np.median(spacing) > 0.4
+    np.testing.assert_array_equal(after.bridged, before.bridged)
+
+
+def test_patches_that_miss_each_other_halfway_are_not_joined(random):
+    points = random_sphere(20_000)
+    before, after, _ = before_and_after(points, points)
+    _, astray, _ = before_and_after(points, points, random.uniform(-30, 30, (len(points), 1, 1)))
+    assert (after.bridged & ~before.bridged).sum() > 50
+    assert (astray.bridged & ~before.bridged).sum() < 0.5 * (after.bridged & ~before.bridged).sum()
