@@ -1,7 +1,7 @@
 """The whole method, in the order of the paper's algorithm box."""
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,6 @@ from .field.grid import fit_grid
 from .field.integration import distance_field
 from .field.local_surface import fit_local_surface
 from .field.narrow_band import banded_field, trimmed
-from .field.steps import NearBand
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
@@ -145,7 +144,7 @@ def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
 
 def _field(surfaces, near, feet, grid, samples, band):
     """The field in the input's units."""
-    near = NearBand(near.node, near.step * samples.scale)
+    near = replace(near, step=near.step * samples.scale)
     origin, cell = samples.to_input_units(grid.origin), grid.spacing * samples.scale
     sdf, scale = "signed" in surfaces.meshes, np.float32(samples.scale)
     if band is None:

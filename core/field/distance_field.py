@@ -21,14 +21,14 @@ class _OnGrid:
 
     def sample(self, x) -> np.ndarray:
         """Distance at points `x`, (m,3) -> (m,) float64: trilinear where there are values, next to the surface of an
-        unsigned field by the steps `near` (see :meth:`NearBand.distances`); outside the box, the value at the nearest
+        unsigned field by the steps `near` (see :meth:`NearBand.between`); outside the box, the value at the nearest
         point of the box plus the distance to that point."""
         cells = (np.asarray(x, np.float64) - self.origin) / self.spacing
         inside = np.clip(cells, 0, np.array(self.shape) - 1)
         found = self._inside(inside)
         if self.near is not None and not self.sdf:
-            row, distance = self.near.distances(inside, self.shape, self.spacing)
-            found[row] = distance
+            row, step = self.near.between(inside, self.shape, self.spacing)
+            found[row] = np.sqrt(np.einsum("mi,mi->m", step, step))
         return found + self.spacing * np.linalg.norm(cells - inside, axis=1)
 
     def gradient(self, x) -> np.ndarray:

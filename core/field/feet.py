@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 
 from .grid import Grid
 from .local_surface import LocalSurface, Projection
+from .projection import FROM_NODES
 
 SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
 _SETTLED = 0.1  # cells, residual of a foot point that counts
@@ -69,7 +70,7 @@ def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, prog
     seed = near.distance <= SEED_BAND * grid.spacing
     node, near = node[seed], near[seed]
     feet = grid.positions(node) - near.step
-    again = surface.project(feet, progress)
+    again = surface.project(feet, progress, FROM_NODES)
     kept = again.distance <= _SETTLED * grid.spacing
     node, near, feet = node[kept], near[kept], feet[kept] - again.step[kept]
     normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]

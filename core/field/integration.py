@@ -21,6 +21,7 @@ from .grid import Grid
 from .local_surface import LocalSurface
 from .near_nodes import near_nodes
 from .poisson import poisson
+from .projection import FROM_NODES
 from .steps import NearBand
 
 BAND = 2.0  # cells, where the projection distance itself is kept
@@ -36,7 +37,7 @@ def distance_field(
     with directions by `diffusion`: "kernel" or "grid"."""
     progress = Progress.of(progress)
     node = near_nodes(surface, grid, BAND, progress.part(0.0, 0.05))
-    near = surface.project(grid.positions(node), progress.part(0.05, 0.6))
+    near = surface.project(grid.positions(node), progress.part(0.05, 0.6), FROM_NODES)
     inside = near.distance <= BAND * grid.spacing
     node, near = node[inside], near[inside]
     if integration == "poisson":
@@ -48,7 +49,7 @@ def distance_field(
         held, feet = settled_feet(surface, grid, node, near, progress.part(0.6, 0.8))
         values = _transport(grid, held, feet, progress.part(0.8, 1.0))
         values.flat[node] = no_farther_than_feet(near.distance, values.flat[node], grid)
-    return values, NearBand(node, near.step)
+    return values, NearBand(node, near.step, near.past_rim)
 
 
 def _transport(grid, node, feet, progress):

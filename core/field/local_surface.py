@@ -10,7 +10,7 @@ from ..linalg import COMPONENTS
 from ..progress import Progress
 from .borders import Rims, find_rims
 from .curvature import bending, tangent_frames
-from .projection import Projection, project
+from .projection import NEAREST, Projection, project
 from .rim_lines import with_rim_lines
 from .sampling_gaps import with_sampling_gaps_bridged
 
@@ -55,9 +55,9 @@ class LocalSurface:
         single = (np.ascontiguousarray(each, np.float32) for each in (self.normals.T, bend, self.spacing))
         return Columns(np.ascontiguousarray(self.points.T), *single)
 
-    def project(self, x: np.ndarray, progress=None) -> Projection:
+    def project(self, x: np.ndarray, progress=None, nearest: int = NEAREST) -> Projection:
         """Where queries (m,3) close to the surface fall on it, see :func:`project`."""
-        return project(self, x, Progress.of(progress))
+        return project(self, x, Progress.of(progress), nearest)
 
 
 def patch_neighbours(tree: KDTree, progress=None) -> np.ndarray:

@@ -15,6 +15,7 @@ from .grid import CORNERS, Grid
 from .integration import BAND
 from .local_surface import LocalSurface, Projection
 from .near_nodes import sample_reach
+from .projection import FROM_NODES
 from .steps import NearBand
 
 _HALF = 0.5 * np.sqrt(3)  # cells, from the middle of a group of 2^3 nodes to each of them
@@ -37,7 +38,7 @@ def banded_field(surface: LocalSurface, grid: Grid, width: float, progress=None)
     feet = _feet(surface, grid, node, near, progress.part(0.6, 0.75))
     values = _around(surface, grid, width, corner, sample, feet, progress.part(0.75, 1.0))
     values.put(node, no_farther_than_feet(near.distance, values.at(node), grid))
-    return values.merged(), NearBand(node, near.step), feet
+    return values.merged(), NearBand(node, near.step, near.past_rim), feet
 
 
 def trimmed(values: Blocks, band: float) -> Blocks:
@@ -110,7 +111,7 @@ def _projected(surface, grid, corner, sample, progress):
         part, middle = part[near], middle[near]
         part = part[surface.project(middle, turn.part(0, 0.2)).distance <= grid.spacing * (BAND + _HALF + _MARGIN)]
         node = _members(grid, part)[0]
-        projection = surface.project(grid.positions(node), turn.part(0.2, 1))
+        projection = surface.project(grid.positions(node), turn.part(0.2, 1), FROM_NODES)
         inside = projection.distance <= BAND * grid.spacing
         found.append((node[inside], projection[inside]))
     node = np.concatenate([node for node, _ in found])

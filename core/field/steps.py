@@ -13,11 +13,13 @@ _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point 
 class NearBand:
     """The nodes within two cells of the surface.
 
-    node : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
+    node     : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
+    past_rim : (b,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
     """
 
     node: np.ndarray
     step: np.ndarray
+    past_rim: np.ndarray
 
     def rows(self, node: np.ndarray) -> np.ndarray:
         """Where nodes (m,) stand in the band, -1 for those that do not."""
@@ -26,11 +28,12 @@ class NearBand:
         row = np.minimum(np.searchsorted(self.node, node), len(self.node) - 1)
         return np.where(self.node[row] == node, row, -1)
 
-    def distances(
-        self, cells: np.ndarray, shape: tuple[int, int, int], spacing: float
+    def between(
+        self, cells: np.ndarray, shape: tuple[int, int, int], spacing: float, off_rims: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Distances between the nodes of a grid of `shape`, at those of the positions `cells` (m,3), in cells and
-        inside the grid, whose eight corners lie in the band: their rows (r,) and the distances there (r,) float64.
+        """Steps from the surface to places between the nodes of a grid of `shape`, at those of the positions `cells`
+        (m,3), in cells and inside the grid, whose eight corners lie in the band: their rows (r,) and the steps there
+        (r,3) float64. With `off_rims`, no corner's step is one past a rim.
 
         An unsigned distance has a kink on the surface, where a trilinear reading of the nodes' values gives a third of
         a cell instead of zero. The step from the foot point, the gradient of u^2 / 2, has none (Ambrosio and
@@ -43,6 +46,8 @@ class NearBand:
         strides = np.array([shape[1] * shape[2], shape[2], 1])
         row = self.rows((lowest @ strides)[:, None] + CORNERS @ strides)
         chosen = np.flatnonzero((row >= 0).all(axis=1))
+        if off_rims:
+            chosen = chosen[~self.past_rim[row[chosen]].any(axis=1)]
         corner = self.step[row[chosen]].reshape(-1, 2, 2, 2, 3)
         apart = [np.diff(corner[..., axis], axis=1 + axis).reshape(len(chosen), 4) for axis in range(3)]
         divergent = np.min(apart, axis=(0, 2)) >= -_TOWARDS * spacing
@@ -50,4 +55,4 @@ class NearBand:
         for share in (cells[chosen] - lowest[chosen]).T:
             share = share.reshape(-1, *[1] * (blend.ndim - 2))
             blend = (1 - share) * blend[:, 0] + share * blend[:, 1]
-        return chosen, np.sqrt(np.einsum("mi,mi->m", blend, blend))
+        return chosen, blend

@@ -21,6 +21,7 @@ from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
 from ..progress import Progress
+from .first_steps import first_steps
 from .meeting_edges import meeting_edges
 from .mending import mend
 
@@ -68,10 +69,10 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     progress(0.5)
     alone = ~np.isin(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
     edge, vote, place = edge[alone], vote[alone], place[alone]
-    found = surface.project(place, progress.part(0.5, 0.9))
+    step, _ = first_steps(place, band, surface, grid, progress.part(0.5, 0.9))
     progress(0.9)
-    on = found.distance <= _COVERED * grid.spacing
-    edge, place, vote = edge[on], place[on] - found.step[on], vote[on]
+    on = np.linalg.norm(step, axis=1) <= _COVERED * grid.spacing
+    edge, place, vote = edge[on], place[on] - step[on], vote[on]
     once, twice = _once(meet)
     node, axis = np.divmod(edge, 3)
     node, axis = np.concatenate([node, meet.node[once]]), np.concatenate([axis, meet.axis[once]])

@@ -5,16 +5,17 @@ import numpy as np
 from ..field.blocks import each
 from ..field.grid import PADDING, Grid
 from ..field.local_surface import LocalSurface
+from ..field.steps import NearBand
 from ..progress import Progress
 from .centring import centred
 from .corners import into_corners
 from .evening import evened
+from .first_steps import first_steps
 from .isosurface import isosurface
 from .mesh import Mesh
 from .pieces import pieces_with_samples
 from .triangles import mesh_of
 
-_ROUNDS = 2
 CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made background
 _SPARSE = 3.0  # cells, median local spacing above which the iso-surface is taken further off
 _RAISED = 0.5  # cells further for each cell of it above that
@@ -34,17 +35,19 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     return max(offset, min(raised, _WITHIN * padding))
 
 
-def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:
+def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:
     """The iso-surface of the distance field at the level that :func:`level_for` says, pulled onto the zero set.
 
     values : (nx,ny,nz) float32 or Blocks, distances at the grid's nodes, units of the samples; in Blocks those up to
              CLAMP cells beyond the level
+    band   : the nodes near the surface
 
     The idea of shrinking a double cover is DCUDF's (Hou et al., ACM TOG 42(6), 2023); here every vertex goes straight
     to its foot point on the local surface, twice, with its faces made even in between, then drawn into concave corners
-    and put astride the surface, instead of descending a mesh energy. The mesh is closed and each of its edges has two
-    faces, wound so that normals point away from the surface on either side; an open sheet gives one piece, a closed one
-    an outer and an inner piece. Flattened against the surface, rims have thin triangles.
+    and put astride the surface, instead of descending a mesh energy. The first time, the steps to the nodes around it
+    tell the way, where they can. The mesh is closed and each of its edges has two faces, wound so that normals point
+    away from the surface on either side; an open sheet gives one piece, a closed one an outer and an inner piece.
+    Flattened against the surface, rims have thin triangles.
 
     Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
@@ -54,16 +57,21 @@ def double_cover(values, surface: LocalSurface, grid: Grid, offset: float, progr
     clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)
     progress(0.0)
     cells, faces = isosurface(clamped, level)
-    vertices, part = grid.origin + grid.spacing * cells, progress.part(0.0, 0.7)
-    for turn in range(_ROUNDS):
-        found = surface.project(vertices, part.part(turn / _ROUNDS, (turn + 1) / _ROUNDS))
-        length = np.linalg.norm(found.step, axis=1, keepdims=True)
-        share = np.minimum(1.0, _LONGEST_STEP * level / np.maximum(length, np.finfo(float).tiny))
-        vertices = vertices - found.step * share
-        if turn == 0:
-            side = np.where(found.past_rim[:, None], 0.0, found.step / np.maximum(length, np.finfo(float).tiny))
-            vertices = evened(vertices, faces, found.past_rim)
+    vertices = grid.origin + grid.spacing * cells
+    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.0, 0.2))
+    side = np.where(past_rim[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
+    vertices = evened(_moved(vertices, step, level), faces, past_rim)
+    vertices = _moved(vertices, surface.project(vertices, progress.part(0.3, 0.7)).step, level)
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
     mesh = centred(mesh_of(vertices, faces))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
+
+
+def _moved(vertices, step, level):
+    """The vertices less the steps, shortened where they are very long."""
+    return vertices - step * np.minimum(1.0, _LONGEST_STEP * level / np.maximum(_length(step), np.finfo(float).tiny))
+
+
+def _length(step):
+    return np.linalg.norm(step, axis=1, keepdims=True)

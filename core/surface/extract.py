@@ -66,7 +66,8 @@ def extract_surfaces(
     if settings.faces == "quads" and kind != "none":
         need_quads()
     if kind in ("double", "both"):
-        meshes["double"] = double_cover(values, local, grid, settings.offset, progress.part(0.0, 0.3, "double cover"))
+        part = progress.part(0.0, 0.3, "double cover")
+        meshes["double"] = double_cover(values, band, local, grid, settings.offset, part)
     if kind in WITH_SIDES:
         crossings = find_crossings(band, local, grid, progress.part(0.3, 0.5, "crossings"))
         sides = find_sides(values, crossings, local, grid, progress.part(0.5, 0.6, "crossings"))

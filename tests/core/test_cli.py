@@ -55,7 +55,7 @@ def calls(monkeypatch):
                 np.zeros(3),
                 0.25,
                 sdf=settings.surface == "signed",
-                near=NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]])),
+                near=NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]]), np.zeros(2, bool)),
             ),
             mesh if settings.surface in ("double", "both", "signed") else None,
             mesh if settings.surface in ("single", "both") else None,

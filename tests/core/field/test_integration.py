@@ -10,6 +10,7 @@ from core.field.feet import settled_feet
 from core.field.grid import fit_grid
 from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
+from core.field.projection import FROM_NODES
 from core.points import local_spacing
 from core.progress import Progress
 from tests import shapes
@@ -149,7 +150,7 @@ class TestAlone:
         surface, grid = stage
         values, _ = distance_field(surface, grid)
         near = np.flatnonzero(values < grid.spacing)
-        projected = surface.project(grid.positions(near)).distance
+        projected = surface.project(grid.positions(near), nearest=FROM_NODES).distance
         np.testing.assert_allclose(values.flat[near], projected, atol=1e-6)
 
     def test_nowhere_is_it_more_than_to_a_foot(self):
@@ -158,7 +159,7 @@ class TestAlone:
         surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
         grid = fit_grid(points, 64)
         values, near = distance_field(surface, grid)
-        projected = surface.project(grid.positions(near.node))
+        projected = surface.project(grid.positions(near.node), nearest=FROM_NODES)
         _, feet = settled_feet(surface, grid, near.node, projected, Progress())
         found, bound = values.flat[near.node], feet.distances(grid.positions(near.node))
         away = found > 0.7 * grid.spacing

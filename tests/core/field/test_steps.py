@@ -1,5 +1,7 @@
 """Distances read between the nodes, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,12 @@ def band(foot_of, width=2.0):
     nodes = np.indices(SHAPE).reshape(3, -1).T.astype(float)
     step = nodes - foot_of(nodes)
     near = np.flatnonzero(np.linalg.norm(step, axis=1) <= width)
-    return NearBand(near, step[near])
+    return NearBand(near, step[near], np.zeros(len(near), bool))
+
+
+def distances(band, x):
+    row, step = band.between(x, SHAPE, 1.0)
+    return row, np.linalg.norm(step, axis=1)
 
 
 def onto_plane(normal, offset):
@@ -33,7 +40,7 @@ def test_plane_is_exact_on_and_off_the_surface(normal):
     x = np.concatenate([positions(), foot(positions(1))])
     x = x[((x >= 0) & (x <= np.array(SHAPE) - 1)).all(axis=1)]
     true = np.linalg.norm(x - foot(x), axis=1)
-    row, distance = band(foot).distances(x, SHAPE, 1.0)
+    row, distance = distances(band(foot), x)
     assert np.isin(np.flatnonzero(true < 0.2), row).all()
     np.testing.assert_allclose(distance, true[row], atol=1e-9)
 
@@ -43,7 +50,7 @@ def test_straight_rim_and_single_point_are_exact():
     point = lambda x: np.tile([11.2, 9.4, 13.7], (len(x), 1))  # noqa: E731
     for foot in (rim, point):
         x = positions(count=40000)
-        row, distance = band(foot).distances(x, SHAPE, 1.0)
+        row, distance = distances(band(foot), x)
         assert len(row) > 20
         np.testing.assert_allclose(distance, np.linalg.norm(x - foot(x), axis=1)[row], atol=1e-9)
 
@@ -52,7 +59,7 @@ def test_sphere_errs_by_the_square_of_a_cell():
     centre, radius = np.array([11.5, 9.5, 13.5]), 7.0
     foot = lambda x: centre + radius * (x - centre) / np.linalg.norm(x - centre, axis=1, keepdims=True)  # noqa: E731
     x = foot(positions())
-    row, distance = band(foot).distances(x, SHAPE, 1.0)
+    row, distance = distances(band(foot), x)
     assert len(row) > 0.99 * len(x)
     assert distance.max() < 1 / radius
     assert distance.mean() < 0.25 / radius
@@ -68,15 +75,27 @@ def test_no_sheet_appears_midway_between_two(gap):
     x = positions()
     x[:, 2] = np.random.default_rng(2).uniform(low - 1, high + 1, len(x))
     true = np.minimum(np.abs(x[:, 2] - low), np.abs(x[:, 2] - high))
-    row, distance = band(foot).distances(x, SHAPE, 1.0)
+    row, distance = distances(band(foot), x)
     assert np.abs(distance - true[row]).max() < 0.5
 
 
 def test_positions_away_from_the_band_are_left_out():
-    row, _ = band(onto_plane((0, 0, 1), 5.0)).distances(positions(), SHAPE, 1.0)
+    row, _ = distances(band(onto_plane((0, 0, 1), 5.0)), positions())
     assert len(row)
     assert (np.abs(positions()[row, 2] - 5.0) < 3).all()
-    assert not len(NearBand(np.empty(0, np.int64), np.empty((0, 3))).distances(positions(), SHAPE, 1.0)[0])
+    nothing = NearBand(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, bool))
+    assert not len(distances(nothing, positions())[0])
+
+
+def test_steps_lead_to_the_foot_points_and_those_past_rims_can_be_left_out():
+    foot, x = onto_plane((1, 2, 3), 9.3), positions()
+    known = band(foot)
+    at = np.stack(np.unravel_index(known.node, SHAPE), axis=1)
+    rimmed = replace(known, past_rim=at[:, 0] > 11)
+    row, step = rimmed.between(x, SHAPE, 1.0)
+    np.testing.assert_allclose(step, (x - foot(x))[row], atol=1e-9)
+    fewer, _ = rimmed.between(x, SHAPE, 1.0, off_rims=True)
+    np.testing.assert_array_equal(fewer, row[x[row, 0] < 11])
 
 
 @pytest.mark.parametrize("band", [None, 4])

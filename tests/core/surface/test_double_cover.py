@@ -136,7 +136,7 @@ class TestAlone:
             fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0),
             fit_grid(points, 24),
         )
-        return distance_field(surface, grid)[0], surface, grid, 1.0
+        return *distance_field(surface, grid), surface, grid, 1.0
 
     def test_gives_a_triangle_mesh_in_units_of_the_samples(self, stage):
         mesh = double_cover(*stage)
