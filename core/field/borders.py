@@ -70,8 +70,7 @@ def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge
     def find(part):
         return _find_rims(part, points, normals, frames[part], spacing[part], neighbours[part], tree, bridge)
 
-    chunk = min(_CHUNK, max(1, _PAIRS // _within(bridge, len(points))))
-    chunks = Progress.of(progress).chunks(len(points), chunk)
+    chunks = Progress.of(progress).chunks(len(points), rows_at_a_time(bridge, len(points)))
     found = [rims for _, rims in in_order(find, chunks)]
     return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
 
@@ -224,6 +223,11 @@ def across_gaps(rows, outward, spacing, points, normals, tree: KDTree, bridge: f
     distance = np.where(ahead & near & sheet, distance, np.inf)
     nearest = np.arange(len(rows)), distance.argmin(axis=1)
     return distance[nearest], other[nearest]
+
+
+def rows_at_a_time(bridge: float, n: int) -> int:
+    """Samples, of n, whose gaps can be looked across at a time, see :func:`across_gaps`."""
+    return min(_CHUNK, max(1, _PAIRS // _within(bridge, n)))
 
 
 def bridged_reach(distance, spacing) -> np.ndarray:

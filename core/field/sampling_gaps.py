@@ -10,21 +10,27 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from .borders import Rims, across_gaps, bridged_reach, chain_lengths
+from ..progress import Progress
+from .borders import Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
 
 _FEW = 5  # samples in a row that a gap in the sampling may have at its rim
 _WIDER = 1.5  # bridging lengths, the widest of them
 _APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
 
 
-def with_sampling_gaps_bridged(rims: Rims, points, normals, bend, spacing, tree: KDTree, bridge: float) -> Rims:
+def with_sampling_gaps_bridged(
+    rims: Rims, points, normals, bend, spacing, tree: KDTree, bridge: float, progress=None
+) -> Rims:
     """The rims with gaps in the sampling bridged that are up to half as wide again as `bridge` local spacings.
 
     points, normals : (n,3) float64     bend : (n,3,3) of the patches     spacing : (n,) local spacing
     """
     few = chain_lengths(rims, rims.gap) <= _FEW
-    row = np.flatnonzero(rims.gap & ~rims.bridged & few)
-    distance, other = across_gaps(row, rims.outward[row], spacing[row], points, normals, tree, _WIDER * bridge)
+    row, widest = np.flatnonzero(rims.gap & ~rims.bridged & few), _WIDER * bridge
+    distance, other = np.empty(len(row)), np.empty(len(row), np.int64)
+    for part in Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points))):
+        given = row[part], rims.outward[row[part]], spacing[row[part]]
+        distance[part], other[part] = across_gaps(*given, points, normals, tree, widest)
     found = np.isfinite(distance) & few[other]
     row, other, distance = row[found], other[found], distance[found]
     met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance

@@ -5,6 +5,10 @@ import numpy as np
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
+from ..parallel import in_order
+from ..progress import Progress
+
+_CHUNK = 1 << 15  # places
 
 
 def first_steps(
@@ -16,13 +20,17 @@ def first_steps(
     rim is near, x is projected. Steps read off are some thousandths of a cell from projected ones on smooth sheets, and
     more where several are near: places that are to end on the surface need a projection afterwards.
     """
-    cells = (x - grid.origin) / grid.spacing
-    row = np.flatnonzero(((cells >= 0) & (cells <= np.array(grid.shape) - 1)).all(axis=1))
-    read, between = band.between(cells[row], grid.shape, grid.spacing, off_rims=True)
-    row = row[read]
-    rest = np.ones(len(x), bool)
-    rest[row] = False
-    found = surface.project(x[rest], progress)
-    step, past_rim = np.empty_like(x), np.zeros(len(x), bool)
-    step[row], step[rest], past_rim[rest] = between, found.step, found.past_rim
+    progress = Progress.of(progress)
+    step, past_rim, rest = np.empty_like(x), np.zeros(len(x), bool), np.ones(len(x), bool)
+
+    def read(part):
+        cells = (x[part] - grid.origin) / grid.spacing
+        inside = np.flatnonzero(((cells >= 0) & (cells <= np.array(grid.shape) - 1)).all(axis=1))
+        row, between = band.between(cells[inside], grid.shape, grid.spacing, off_rims=True)
+        return part.start + inside[row], between
+
+    for _, (row, between) in in_order(read, progress.part(0.0, 0.3).chunks(len(x), _CHUNK)):
+        step[row], rest[row] = between, False
+    found = surface.project(x[rest], progress.part(0.3, 1.0))
+    step[rest], past_rim[rest] = found.step, found.past_rim
     return step, past_rim
