@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from core.field import borders
 from core.field.borders import find_rims
 from core.field.curvature import bending, tangent_frames
 from core.field.local_surface import patch_neighbours
@@ -76,3 +77,12 @@ def test_patches_that_miss_each_other_halfway_are_not_joined(random):
     _, astray, _ = before_and_after(points, points, random.uniform(-30, 30, (len(points), 1, 1)))
     assert (after.bridged & ~before.bridged).sum() > 50
     assert (astray.bridged & ~before.bridged).sum() < 0.5 * (after.bridged & ~before.bridged).sum()
+
+
+def test_looking_across_some_gaps_at_a_time_changes_nothing(monkeypatch):
+    points = random_sphere(20_000)
+    whole = before_and_after(points, points)[1]
+    monkeypatch.setattr(borders, "_PAIRS", 2000)
+    few = before_and_after(points, points)[1]
+    np.testing.assert_array_equal(few.bridged, whole.bridged)
+    np.testing.assert_array_equal(few.reach, whole.reach)
