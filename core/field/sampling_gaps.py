@@ -1,6 +1,7 @@
 """Gaps in the sampling that are wider than the bridging length, told apart from openings of the surface.
 
-Among many random samples some leave a disc of four local spacings across empty. Around an opening the samples at its
+Among n random samples, one to a square of the local spacing, some leave a disc of sqrt(4 / pi (ln n + ln ln n)) local
+spacings across empty, four of 25,000 (n A exp(-A) is 1 there, A the disc's area). Around an opening the samples at its
 rim follow one another; around a gap in the sampling few look across a wide angle without any, and the patches to its
 two sides meet over it.
 """
@@ -13,20 +14,22 @@ from scipy.spatial import KDTree
 from ..progress import Progress
 from .borders import Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
 
-_FEW = 5  # samples in a row that a gap in the sampling may have at its rim
-_WIDER = 1.5  # bridging lengths, the widest of them
+_FEW = 4  # samples in a row that a gap in the sampling may have at its rim
+_WIDER = 1.5  # bridging lengths, at most, that a gap in the sampling is wide
+_CHANCE = 1.2  # of the width that chance leaves; the spacing beside a gap scatters, too
 _APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
 
 
 def with_sampling_gaps_bridged(
     rims: Rims, points, normals, bend, spacing, tree: KDTree, bridge: float, progress=None
 ) -> Rims:
-    """The rims with gaps in the sampling bridged that are up to half as wide again as `bridge` local spacings.
+    """The rims with gaps in the sampling bridged that are as wide as chance leaves them, but no more than half as wide
+    again as `bridge` local spacings.
 
     points, normals : (n,3) float64     bend : (n,3,3) of the patches     spacing : (n,) local spacing
     """
     few = chain_lengths(rims, rims.gap) <= _FEW
-    row, widest = np.flatnonzero(rims.gap & ~rims.bridged & few), _WIDER * bridge
+    row, widest = np.flatnonzero(rims.gap & ~rims.bridged & few), min(_WIDER * bridge, _left_by_chance(len(points)))
     distance, other = np.empty(len(row)), np.empty(len(row), np.int64)
     for part in Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points))):
         given = row[part], rims.outward[row[part]], spacing[row[part]]
@@ -38,6 +41,12 @@ def with_sampling_gaps_bridged(
     bridged, reach = rims.bridged.copy(), rims.reach.copy()
     bridged[row], reach[row] = True, bridged_reach(distance, spacing[row])
     return replace(rims, bridged=bridged, reach=reach)
+
+
+def _left_by_chance(n):
+    """How wide a gap there may be among n random samples, local spacings."""
+    logarithm = np.log(max(n, 3))
+    return _CHANCE * np.sqrt(4 / np.pi * (logarithm + np.log(logarithm)))
 
 
 def _apart_halfway(row, other, points, normals, bend):
