@@ -49,8 +49,7 @@ def paper_plane() -> Surface:
     for corner, tip in sides:
         fold = 0.6 * np.array(nose) + 0.4 * corner
         triangles += [[tail, nose, fold], [tail, fold, corner], [fold, corner, tip]]
-    faces = np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3)
-    return from_mesh(Mesh(np.array(triangles, float).reshape(-1, 3), faces), line(tail, nose))
+    return _of_triangles(triangles, line(tail, nose))
 
 
 def box_axis() -> Surface:
@@ -69,8 +68,7 @@ def box_axis() -> Surface:
     corners = sheets[0]
     inner = [line(p, q) for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     outer = [line((s * a, t * b, u * c), (s * (a - c), t * (b - c), 0)) for s, t, u in itertools.product(*[sides] * 3)]
-    faces = np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3)
-    return from_mesh(Mesh(np.array(triangles, float).reshape(-1, 3), faces), np.concatenate([*inner, *outer]))
+    return _of_triangles(triangles, np.concatenate([*inner, *outer]))
 
 
 def candy() -> Surface:
@@ -158,6 +156,12 @@ def strawberry() -> Surface:
     turn = np.linspace(0, 1, 400)
     ring = fruit(np.stack([np.full_like(turn, ring_step / steps), turn], axis=1))
     return from_patches([Patch(fruit, (steps, leaves * cells)), *(leaf(k) for k in range(leaves))], ring)
+
+
+def _of_triangles(triangles, curve):
+    """The surface of flat triangles (t,3,3) whose sheets meet along `curve` (k,3)."""
+    faces = np.arange(3 * len(triangles), dtype=np.int32).reshape(-1, 3)
+    return from_mesh(Mesh(np.array(triangles, float).reshape(-1, 3), faces), curve)
 
 
 def _ball(uv):

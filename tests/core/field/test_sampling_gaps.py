@@ -26,13 +26,8 @@ def open_rim(rims):
     return rims.gap & ~rims.bridged
 
 
-def random_sphere(count, seed=0):
-    points = np.random.default_rng(seed).normal(size=(count, 3))
-    return points / np.linalg.norm(points, axis=1, keepdims=True)
-
-
 def test_random_samples_of_a_closed_surface_leave_gaps_and_nearly_all_are_bridged():
-    points = random_sphere(20_000)
+    points = shapes.scattered_sphere(20_000)
     before, after, spacing = before_and_after(points, points)
     assert open_rim(before).sum() > 50
     assert open_rim(after).sum() < 0.2 * open_rim(before).sum()
@@ -72,7 +67,7 @@ def test_a_round_hole_twice_as_wide_as_the_bridging_length_stays_open():
 
 
 def test_patches_that_miss_each_other_halfway_are_not_joined(random):
-    points = random_sphere(20_000)
+    points = shapes.scattered_sphere(20_000)
     before, after, _ = before_and_after(points, points)
     _, astray, _ = before_and_after(points, points, random.uniform(-30, 30, (len(points), 1, 1)))
     assert (after.bridged & ~before.bridged).sum() > 50
@@ -80,7 +75,7 @@ def test_patches_that_miss_each_other_halfway_are_not_joined(random):
 
 
 def test_looking_across_some_gaps_at_a_time_changes_nothing(monkeypatch):
-    points = random_sphere(20_000)
+    points = shapes.scattered_sphere(20_000)
     whole = before_and_after(points, points)[1]
     monkeypatch.setattr(borders, "_PAIRS", 2000)
     few = before_and_after(points, points)[1]

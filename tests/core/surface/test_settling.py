@@ -5,6 +5,7 @@ from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.settling import settled
 from tests import shapes
+from tests.counted import Counted
 
 CELL = 0.05
 
@@ -13,17 +14,6 @@ CELL = 0.05
 def sphere():
     points = shapes.sphere(1500)
     return fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0)
-
-
-class Counted:
-    """A local surface that counts what is projected on it."""
-
-    def __init__(self, surface):
-        self.surface, self.count = surface, 0
-
-    def project(self, x, progress=None):
-        self.count += len(x)
-        return self.surface.project(x, progress)
 
 
 def test_vertices_come_to_the_surface_from_near_and_far(sphere):
