@@ -12,13 +12,14 @@ from core import Mesh
 from core.cleaning.clean import clean
 from core.linalg import outer, principal_axes
 from core.normals.adam import MAX_STEPS, minimise
+from core.normals.creases import normals_of_sheets
 from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
+from core.normals.estimate import estimate_normals
 from core.normals.mirrors import Mirrors
 from core.normals.pca import pca_normals
 from core.normals.reflection import reflection_sweeps, sweep_once
 from core.points import local_spacing, prepare_samples
 from core.voronoi.bisectors import bisector_samples
-from core.voronoi.facets import voronoi_facets
 from core.voronoi.polygons import facet_polygons
 
 from .cases import Case, load_case
@@ -75,7 +76,8 @@ class Problem:
         return NormalEnergy(self.points, self.spacing, self.samples, weights, printed_alignment)
 
     def sweeps(self, start=None) -> np.ndarray:
-        return reflection_sweeps(self.points, self.spacing, self.samples.facets, start=start)[0]
+        axes, _ = reflection_sweeps(self.mirrors, start=start)
+        return normals_of_sheets(self.points, self.spacing, self.mirrors, axes)[0]
 
     def adam(self, energy: NormalEnergy, start=None, max_steps=MAX_STEPS) -> np.ndarray:
         """Axes of least energy from the plane fit, or from `start`."""
@@ -145,7 +147,7 @@ def open3d_normals(points: np.ndarray) -> np.ndarray:
 def _cleaned(case):
     samples, _ = clean(prepare_samples(case.points))
     spacing = local_spacing(samples.points)
-    axes = reflection_sweeps(samples.points, spacing, voronoi_facets(samples.points, spacing))[0]
+    axes, _, _ = estimate_normals(samples.points, spacing)
     rows = samples.source_index
     return normal_agreement(axes, case.normals[rows], case.points[rows], case.nm_curve)
 
@@ -200,9 +202,7 @@ def convergence(case: Case) -> dict:
     for name, problem in _inputs(case).items():
         _, history = minimise(problem.energy().value_and_gradient, problem.random_start(), max_steps=CURVE_STEPS)
         turns = mean_turns(problem.mirrors, problem.random_start(), CURVE_SWEEPS)
-        _, _, sweeps = reflection_sweeps(
-            problem.points, problem.spacing, problem.samples.facets, start=problem.random_start()
-        )
+        _, sweeps = reflection_sweeps(problem.mirrors, start=problem.random_start())
         energy = np.divide(history, history[0])
         curves[name] = {"points": len(problem.points), "energy": energy, "turns": turns, "sweeps": sweeps}
     return curves

@@ -22,6 +22,7 @@ _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
 _MEMBERSHIP = 8.0  # how fast samples off each other's plane stop counting as one sheet
 _OTHER_SHEETS = 2  # at most, beside that of the nearest sample
 TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
+_STRAIGHT = 0.98  # least |n . axis| of such a sample; samples of more sheets are mixed where it is less
 MEMBER = 0.3  # least membership of samples whose patch may cover a query
 _SAG = 0.25  # local spacings, by which a sheet may lie closer than its tangent plane
 
@@ -104,14 +105,14 @@ class Nearby:
 
 def _project(surface, x, nearest):
     near = _nearby(surface, x, nearest)
-    found, step, past_rim, member = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
+    found, step, past_rim, member, _ = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
     apart = np.abs(near.height) - _SAG * surface.columns.spacing[near.sample]
     rest = (member <= MEMBER) & (surface.confidence[near.sample] >= TRUSTED)
     for _ in range(_OTHER_SHEETS):
         rest &= apart < found[:, None]
         row, anchor = _first_of_rows(rest)
-        other, other_step, other_rim, member = _onto_sheet(surface, near.rows(row), anchor)
-        closer = other < found[row]
+        other, other_step, other_rim, member, straight = _onto_sheet(surface, near.rows(row), anchor)
+        closer = (other < found[row]) & straight
         chosen = row[closer]
         found[chosen], step[chosen], past_rim[chosen] = other[closer], other_step[closer], other_rim[closer]
         rest[row] &= member <= MEMBER
@@ -152,8 +153,8 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
 
 
 def _onto_sheet(surface, near, anchor):
-    """Distance, step and whether past a rim, for the sheet of each query's sample number `anchor` (m,); and how
-    surely each sample belongs to that sheet, (m,k)."""
+    """Distance, step and whether past a rim, for the sheet of each query's sample number `anchor` (m,); how surely each
+    sample belongs to that sheet, (m,k); and whether the sheet runs there as at that sample, (m,) bool."""
     every = np.arange(len(near.sample))
     foot = sheet_foot(near, anchor)
     step = foot.tau[:, None] * foot.axis + foot.outward
@@ -166,7 +167,8 @@ def _onto_sheet(surface, near, anchor):
     step[lifted] = near.offset[:, every, anchor].T[lifted]
     found[lifted] = away[lifted]
     step *= (bounded / np.maximum(found, _TINY))[:, None]
-    return bounded, step, foot.beyond > 0, foot.member
+    cosine = np.einsum("im,mi->m", near.normals[:, every, anchor], foot.axis)
+    return bounded, step, foot.beyond > 0, foot.member, np.abs(cosine) > _STRAIGHT
 
 
 def sheet_foot(near: Nearby, anchor) -> SheetFoot:

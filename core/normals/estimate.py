@@ -11,6 +11,7 @@ from ..voronoi.bisectors import bisector_samples
 from ..voronoi.facets import voronoi_facets
 from ..voronoi.polygons import facet_polygons
 from .adam import minimise
+from .creases import normals_of_sheets
 from .energy import NormalEnergy
 from .energy_torch import torch_device, torch_value_and_gradient
 from .known import unit_axes
@@ -42,10 +43,12 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     if settings.solver == "energy":
         return _least_energy(points, spacing, settings, constraints, progress)
     facets = voronoi_facets(points, spacing, settings.seed, progress.part(0.0, 0.7))
-    normals, confidence, sweeps = reflection_sweeps(
-        points, spacing, facets, constraints, progress=progress.part(0.7, 1.0)
-    )
-    return normals, confidence, {"facets": len(facets.pairs), "sweeps": sweeps}
+    mirrors = Mirrors(points, spacing, facets, progress.part(0.7, 0.75))
+    normals, sweeps = reflection_sweeps(mirrors, constraints, progress=progress.part(0.75, 0.9))
+    fixed = () if constraints is None else constraints[0]
+    normals, confidence, beside = normals_of_sheets(points, spacing, mirrors, normals, fixed, progress.part(0.9, 1.0))
+    report = {"facets": len(facets.pairs), "sweeps": sweeps, "beside_creases": int(beside.sum())}
+    return normals, confidence, report
 
 
 def _least_energy(points, spacing, settings, constraints, progress):

@@ -1,5 +1,7 @@
 """Voronoi neighbours as mirrors: what the axis at one sample says about the axis at the other."""
 
+from copy import copy
+
 import numpy as np
 from scipy import sparse
 
@@ -8,6 +10,7 @@ from ..progress import Progress
 from ..voronoi.facets import Facets
 
 _CLOSEST = 0.25  # local spacings
+_LEFT = 0.15  # least share of a sample's neighbours, by weight, that it can do with
 
 
 class Mirrors:
@@ -32,11 +35,40 @@ class Mirrors:
         nearest = _CLOSEST * 0.5 * (spacing[self.site] + spacing[self.other])
         weight = np.tile(facets.area, 2) / np.maximum(length, nearest)
         total = np.bincount(self.site, weights=weight, minlength=len(points))
-        weight /= np.where(total > 0, total, 1.0)[self.site]
+        self.weight = weight / np.where(total > 0, total, 1.0)[self.site]
         self.direction = step / length[:, None]
         progress(0.5)
-        self.gather = sparse.csr_matrix((weight, (self.site, np.arange(len(weight)))), shape=(len(points), len(weight)))
+        self._gather(len(points))
+
+    def _gather(self, count):
+        rows = self.site, np.arange(len(self.weight))
+        self.gather = sparse.csr_matrix((self.weight, rows), shape=(count, len(self.weight)))
         self.alignment = self.gather @ outer(self.direction)
+
+    def without(self, cut: np.ndarray) -> "Mirrors":
+        """The same without some of the neighbours, `cut` (p,) bool; samples would keep all of theirs where they would
+        lose more than 85 % of the weight."""
+        count = self.gather.shape[0]
+        left = np.bincount(self.site, weights=np.where(cut, 0.0, self.weight), minlength=count)
+        held = left < _LEFT
+        fewer = copy(self)
+        fewer.weight = np.where(cut & ~held[self.site], 0.0, self.weight) / np.where(held, 1.0, left)[self.site]
+        fewer._gather(count)
+        return fewer
+
+    def and_around(self, sites: np.ndarray) -> np.ndarray:
+        """Some samples, `sites` (n,) bool, and their neighbours."""
+        found = sites.copy()
+        found[self.site[sites[self.other]]] = True
+        return found
+
+    def at(self, sites: np.ndarray) -> "Mirrors":
+        """The same with the neighbours of some samples alone, `sites` (n,) bool."""
+        chosen, fewer = np.flatnonzero(sites[self.site]), copy(self)
+        fewer.site, fewer.other = self.site[chosen], self.other[chosen]
+        fewer.weight, fewer.direction = self.weight[chosen], self.direction[chosen]
+        fewer._gather(len(sites))
+        return fewer
 
     def plane_fit(self) -> np.ndarray:
         """(n,3) axes most perpendicular to the directions of the neighbours: a start that needs no axes."""

@@ -29,7 +29,6 @@ import numpy as np
 
 from ..linalg import outer, principal_axes
 from ..progress import Progress
-from ..voronoi.facets import Facets
 from .mirrors import Mirrors
 
 MAX_SWEEPS = 100
@@ -39,29 +38,26 @@ _FREE_SWEEPS = 20
 _INERTIA = 0.25  # after the free sweeps each axis holds on to itself by this share, which ends two-cycles at creases
 
 
-def reflection_sweeps(points, spacing, facets: Facets, constraints=None, start=None, progress=None):
-    """Axes and confidence of samples from their Voronoi facets.
+def reflection_sweeps(mirrors: Mirrors, constraints=None, start=None, progress=None):
+    """Axes of samples from their Voronoi neighbours.
 
-    points      : (n,3) float64     spacing : (n,) float64, local spacing, same units
     constraints : (indices (k,), axes (k,3) unit) or None; these axes are never updated
     start       : (n,3) unit axes to begin with, or None
-    Returns normals (n,3) float64 unit axes of arbitrary sign; confidence (n,) float64 in [0,1], the weighted mean of
-    the squared cosine between an axis and the mirror images of its neighbours; and the number of sweeps.
+    Returns normals (n,3) float64 unit axes of arbitrary sign, and the number of sweeps.
     """
     progress = Progress.of(progress)
-    mirrors = Mirrors(points, spacing, facets, progress.part(0.0, 0.1))
     normals = mirrors.plane_fit() if start is None else start.copy()
     fixed, axes = ([], np.empty((0, 3))) if constraints is None else constraints
     normals[fixed] = axes
     for sweep in range(1, MAX_SWEEPS + 1):
-        progress(0.1 + 0.9 * sweep / MAX_SWEEPS)
+        progress(sweep / MAX_SWEEPS)
         turned = sweep_once(mirrors, normals, sweep)
         turned[fixed] = axes
         cosine = np.abs(np.einsum("ni,ni->n", turned, normals))
         normals = turned
         if np.arccos(np.minimum(cosine, 1.0)).mean() < TOLERANCE:
             break
-    return normals, mirrors.confidence(normals), sweep
+    return normals, sweep
 
 
 def sweep_once(mirrors: Mirrors, normals: np.ndarray, sweep: int) -> np.ndarray:

@@ -71,7 +71,7 @@ def test_every_method_finds_the_normals_of_a_sphere(sphere):
 
 def test_turns_are_those_of_the_solver(sphere):
     turns = mean_turns(sphere.mirrors, sphere.mirrors.plane_fit(), CURVE_SWEEPS)
-    _, _, count = reflection_sweeps(sphere.points, sphere.spacing, sphere.samples.facets)
+    _, count = reflection_sweeps(sphere.mirrors)
     assert count < CURVE_SWEEPS
     assert [turn < np.degrees(TOLERANCE) for turn in turns[:count]] == [False] * (count - 1) + [True]
 

@@ -119,6 +119,19 @@ def test_sheets_closer_than_the_spacing_do_not_disturb_each_other(random):
     np.testing.assert_allclose(distance, np.abs(np.abs(height) - gap / 2), atol=0.02 * gap)
 
 
+def test_three_sheets_that_meet_in_a_line_are_not_blended_into_a_fourth():
+    rng = np.random.default_rng(0)
+    turn = 2 * np.pi / 3 * rng.integers(0, 3, 3000)
+    along = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    points = rng.uniform(0, 1, (3000, 1)) * along + rng.uniform(-1, 1, (3000, 1)) * [0, 0, 1]
+    surface = fit(points, np.cross([0, 0, 1], along))
+    size = np.median(surface.spacing)
+    x = rng.normal(size=(5000, 3)) * [size, size, 0.4]
+    ends = np.exp(2j * np.pi / 3 * np.arange(3)).conj() * (x[:, :1] + 1j * x[:, 1:2])
+    true = np.hypot(np.minimum(ends.real, 0), ends.imag).min(axis=1)
+    assert (true - surface.project(x).distance > 0.2 * size).mean() < 0.015
+
+
 def test_no_queries():
     points, normals, _ = SHAPES["disc"]
     assert fit(points, normals).project(np.empty((0, 3))).distance.shape == (0,)

@@ -14,8 +14,14 @@ from tests import shapes
 
 
 def sweeps(points, constraints=None, start=None):
+    mirrors = mirrors_of(points)
+    normals, count = reflection_sweeps(mirrors, constraints, start)
+    return normals, mirrors.confidence(normals), count
+
+
+def mirrors_of(points):
     spacing = local_spacing(points)
-    return reflection_sweeps(points, spacing, voronoi_facets(points, spacing), constraints, start)
+    return Mirrors(points, spacing, voronoi_facets(points, spacing))
 
 
 def collinearity(a, b):
@@ -119,10 +125,9 @@ def test_start_is_not_written_to():
 
 
 def test_cancels():
-    points = shapes.sphere(100)
-    spacing = local_spacing(points)
+    mirrors = mirrors_of(shapes.sphere(100))
     with pytest.raises(Cancelled):
-        reflection_sweeps(points, spacing, voronoi_facets(points, spacing), progress=lambda *_: False)
+        reflection_sweeps(mirrors, progress=lambda *_: False)
 
 
 def flower(petals: int = 5, count: int = 12):
@@ -174,8 +179,9 @@ def both(request):
     spacing = local_spacing(points)
     samples = bisector_samples(facet_polygons(points, spacing), spacing, 2.0)
     energy, start = NormalEnergy(points, spacing, samples), random_axes(len(points), 7)
-    swept = reflection_sweeps(points, spacing, samples.facets, start=start)[0]
-    return energy, Mirrors(points, spacing, samples.facets), start, swept, minimise(energy.value_and_gradient, start)[0]
+    mirrors = Mirrors(points, spacing, samples.facets)
+    swept = reflection_sweeps(mirrors, start=start)[0]
+    return energy, mirrors, start, swept, minimise(energy.value_and_gradient, start)[0]
 
 
 def test_sweeps_go_as_low_in_the_energy_as_adam_does_from_the_same_random_start(both):

@@ -1,0 +1,117 @@
+"""Normals beside creases, where sheets meet at an angle.
+
+Around a sample next to a crease the mirror images of the neighbours' axes form clusters, one for each sheet, and the
+sweeps settle between them, on the normal of none. The sample lies on one of the planes, though: its axis is taken to
+the densest cluster (as tangent planes are taken to the largest cluster of votes by A. Boulch and R. Marlet, Computer
+Graphics Forum 31(5), 2012), provided that the neighbours behind it lie in the plane across it, and that those of the
+sample rise out of its present one. Then facets between the sheets are cut, and the sweeps go on with those that are
+left.
+
+The paper has no such step. Where there is no crease it changes nothing at all.
+"""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..linalg import outer, principal_axes
+from ..progress import Progress
+from .mirrors import Mirrors
+
+_NEIGHBOURS = 20  # of a sample, that may lie on its sheet
+_WIDTH = 1.7  # of the Gaussian of their distance, local spacings
+_ALIKE = 0.06  # of the Gaussian of the sine between axes of one sheet
+_AGREED = 0.6  # share of its neighbours that speak for the axis of a sample on a smooth sheet
+_GAIN = 0.1  # by which that share must rise
+_FEWEST = 4.0  # neighbours that must speak for the new axis
+_STEEP, _FLAT = 0.12, 0.05  # mean sines at which neighbours rise out of the plane of the old axis, and of the new one
+_LEAST_TURN = 0.2  # radians
+_ROUNDS, _SWEEPS = 4, 6
+_ACROSS = 0.2  # sine between axis and image, from which neighbours beside a crease are on different sheets
+_CHUNK = 1024  # samples
+
+
+def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), progress=None):
+    """Axes like those that the sweeps end with, but for samples beside creases, which have the normal of one sheet.
+
+    points  : (n,3) float64     spacing : (n,) float64, local spacing, same units     mirrors : of the points
+    normals : (n,3) unit axes   fixed   : rows that stay as they are
+    Returns axes (n,3); confidence (n,) in [0,1], the weighted mean of the squared cosine between an axis and the mirror
+    images of its neighbours, without those across creases; and which samples were taken to one sheet, (n,) bool.
+    """
+    progress, tree = Progress.of(progress), KDTree(points)
+    free, beside, parted = np.ones(len(points), bool), np.zeros(len(points), bool), mirrors
+    free[list(fixed)] = False
+    for part in progress.part(0.0, 0.9).each([progress.part(0.0, 0.45), progress.part(0.45, 0.9)]):
+        normals, moved = _onto_sheets(points, spacing, tree, mirrors, normals, free, part)
+        if not moved.any():
+            break
+        beside |= moved
+        near = mirrors.and_around(beside)
+        parted = mirrors.without(_across(mirrors, normals) & (near[mirrors.site] | near[mirrors.other]))
+        normals = _settled(parted, normals, mirrors.and_around(near) & free)
+    return normals, parted.confidence(normals), beside
+
+
+def _onto_sheets(points, spacing, tree, mirrors, normals, free, progress):
+    """The axes after those of samples beside creases are taken to one sheet's normal, and which these are."""
+    normals, moved = normals.copy(), np.zeros(len(points), bool)
+    for _ in range(_ROUNDS):
+        agreed = mirrors.gather @ _alike(_cosine(normals[mirrors.site], mirrors.images(normals)))
+        rise = mirrors.gather @ np.abs(_cosine(normals[mirrors.site], mirrors.direction))
+        row = np.flatnonzero((agreed < _AGREED) & (rise > _STEEP) & free)
+        axes = np.empty((len(row), 3))
+        for some in progress.chunks(len(row), _CHUNK):
+            axes[some] = _densest(row[some], points, spacing, tree, normals, agreed)
+        turned = np.abs(_cosine(axes, normals[row])) < np.cos(_LEAST_TURN)
+        if not turned.any():
+            break
+        normals[row[turned]], moved[row[turned]] = axes[turned], True
+    return normals, moved
+
+
+def _across(mirrors, normals):
+    """Which neighbours, (p,) bool, have axes unlike those that the samples expect."""
+    return 1 - _cosine(normals[mirrors.site], mirrors.images(normals)) ** 2 > _ACROSS**2
+
+
+def _settled(mirrors, normals, rows):
+    """The axes after sweeps over `rows` (n,) bool alone."""
+    normals, here = normals.copy(), mirrors.at(rows)
+    for _ in range(_SWEEPS):
+        agreement = here.gather @ outer(here.images(normals)) - here.alignment
+        normals[rows] = principal_axes(agreement[rows])[0]
+    return normals
+
+
+def _densest(row, points, spacing, tree, normals, agreed):
+    """The axes (r,3) that most of the images around samples `row` (r,) agree with; the present ones where they are no
+    better founded."""
+    distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
+    distance, other = distance[:, 1:], other[:, 1:]
+    direction = (points[other] - points[row, None]) / distance[..., None]
+    images = normals[other] - 2 * _cosine(normals[other], direction)[..., None] * direction
+    near = np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
+    weight = near * np.maximum(agreed[other], np.finfo(float).tiny)
+
+    tried = np.concatenate([normals[row, None], images], axis=1)
+    cosine = np.einsum("rti,rki->rtk", tried, images)
+    alike = _alike(cosine)
+    share = np.einsum("rtk,rk->rt", alike, weight) / weight.sum(axis=1)[:, None]
+    every, best = np.arange(len(row)), share.argmax(axis=1)
+    alike, sign = alike[every, best], np.sign(cosine[every, best])
+    axes = np.einsum("rk,rki->ri", alike * weight * sign, images)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+
+    near *= alike
+    rise = np.einsum("rk,rk->r", near, np.abs(_cosine(axes[:, None], direction))) / near.sum(axis=1)
+    founded = (share[every, best] > share[:, 0] + _GAIN) & (alike.sum(axis=1) > _FEWEST) & (rise < _FLAT)
+    return np.where(founded[:, None], axes, normals[row])
+
+
+def _cosine(a, b):
+    return np.einsum("...i,...i->...", a, b)
+
+
+def _alike(cosine):
+    """How surely axes at these cosines are those of one sheet, in [0,1]."""
+    return np.exp((np.minimum(cosine**2, 1) - 1) / (2 * _ALIKE**2))
