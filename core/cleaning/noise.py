@@ -5,16 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..normals.estimate import estimate_normals
+from ..normals.mirrors import Mirrors
+from ..normals.reflection import reflection_sweeps
 from ..progress import Progress
+from ..voronoi.facets import voronoi_facets
 from .quadrics import fit_quadrics
 
 LADDER = (12, 20, 32, 50, 80, 128, 200)  # neighbours tried
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
 
-_ANCHORS = 5000  # samples at which the fits are compared
-_REGION = 100  # anchors over which errors are averaged
-_SMOOTHING = 25  # anchors over which the chosen neighbourhoods are averaged
+_ANCHORS = 2500  # samples at which the fits are compared
+_REGION = 70  # anchors over which errors are averaged
+_SMOOTHING = 18  # anchors over which the chosen neighbourhoods are averaged
 _SEEN = 10.0  # a fit shows the noise in full once its radius is this many times its left-out error
 _USABLE = 6.0  # and averages it, rather than following it, once its radius is this many times the noise
 _GAUSS = 1.4826  # standard deviations in a median absolute error
@@ -70,7 +72,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     if not whole and suspect.sum() < least:
         return clean
 
-    _, confidence, _ = estimate_normals(points, spacing, progress=progress.part(0.1, 0.9))
+    confidence = _agreement(points, spacing, progress.part(0.1, 0.9))
     if whole and np.median(confidence) < _AGREED:
         return ~clean
     agreement = np.median(confidence[anchors][region], axis=1)
@@ -81,6 +83,12 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     suspect &= core[region].any(axis=1)
     noisy = suspect[region[:, :_SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
     return noisy[_nearest(points, points[anchors], progress.part(0.9, 1.0))]
+
+
+def _agreement(points, spacing, progress):
+    """Confidence (n,) of normals that are not told apart at creases, where those of noise would be as well."""
+    mirrors = Mirrors(points, spacing, voronoi_facets(points, spacing, progress=progress.part(0.0, 0.7)))
+    return mirrors.confidence(reflection_sweeps(mirrors, progress=progress.part(0.7, 1.0))[0])
 
 
 def _roughness(points, spacing, seed, progress):

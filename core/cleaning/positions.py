@@ -12,8 +12,8 @@ from .quadrics import fit_quadrics
 
 LONGEST_MOVE = 4.0  # standard deviations of the noise
 
-_PASSES = 4
-_SHARE = 0.5  # of the best single neighbourhood: several passes average over more than one
+_PASSES = 2
+_SHARE = 0.7  # of the best single neighbourhood: several passes average over more than one
 _STEPS_PER_OCTAVE = 2  # of the neighbourhood sizes used
 
 
