@@ -38,34 +38,51 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     Returns axes (n,3); confidence (n,) in [0,1], the weighted mean of the squared cosine between an axis and the mirror
     images of its neighbours, without those across creases; and which samples were taken to one sheet, (n,) bool.
     """
-    progress, tree = Progress.of(progress), KDTree(points)
-    free, beside, parted = np.ones(len(points), bool), np.zeros(len(points), bool), mirrors
+    progress = Progress.of(progress)
+    progress(0.0)
+    free, moved, parted = np.ones(len(points), bool), np.zeros(len(points), bool), mirrors
     free[list(fixed)] = False
-    for part in progress.part(0.0, 0.9).each([progress.part(0.0, 0.45), progress.part(0.45, 0.9)]):
-        normals, moved = _onto_sheets(points, spacing, tree, mirrors, normals, free, part)
-        if not moved.any():
-            break
-        beside |= moved
-        near = mirrors.and_around(beside)
-        parted = mirrors.without(_across(mirrors, normals) & (near[mirrors.site] | near[mirrors.other]))
-        normals = _settled(parted, normals, mirrors.and_around(near) & free)
-    return normals, parted.confidence(normals), beside
+    agreed, suspect = _agreed(mirrors, normals, free)
+    if suspect.any():
+        here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
+        for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
+            normals, more = _onto_sheets(points, spacing, tree, here, normals, free, agreed, part)
+            if not more.any():
+                break
+            moved |= more
+            beside = mirrors.and_around(moved)
+            parted = mirrors.without(_across(mirrors, normals) & (beside[mirrors.site] | beside[mirrors.other]))
+            normals = _settled(parted, normals, mirrors.and_around(beside) & free)
+    return normals, parted.confidence(normals), moved
 
 
-def _onto_sheets(points, spacing, tree, mirrors, normals, free, progress):
-    """The axes after those of samples beside creases are taken to one sheet's normal, and which these are."""
-    normals, moved = normals.copy(), np.zeros(len(points), bool)
+def _agreed(mirrors, normals, free):
+    """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
+    cosine = _cosine(normals[mirrors.site], mirrors.images(normals))
+    agreed = mirrors.gather @ _alike(cosine)
+    rise = mirrors.gather @ np.abs(_cosine(normals[mirrors.site], mirrors.direction))
+    return agreed, (agreed < _AGREED) & (rise > _STEEP) & free
+
+
+def _onto_sheets(points, spacing, tree, mirrors, normals, free, agreed, progress):
+    """The axes after those of samples beside creases are taken to one sheet's normal, and which these are; all have
+    their neighbours in `mirrors`. `agreed` (n,) holds for the others."""
+    normals, moved, here = normals.copy(), np.zeros(len(points), bool), np.unique(mirrors.site)
+    changed = ~moved
     for _ in range(_ROUNDS):
-        agreed = mirrors.gather @ _alike(_cosine(normals[mirrors.site], mirrors.images(normals)))
-        rise = mirrors.gather @ np.abs(_cosine(normals[mirrors.site], mirrors.direction))
-        row = np.flatnonzero((agreed < _AGREED) & (rise > _STEEP) & free)
+        found, suspect = _agreed(mirrors, normals, free)
+        agreed[here] = found[here]
+        row = np.flatnonzero(suspect & mirrors.and_around(mirrors.and_around(changed)))
         axes = np.empty((len(row), 3))
         for some in progress.chunks(len(row), _CHUNK):
             axes[some] = _densest(row[some], points, spacing, tree, normals, agreed)
         turned = np.abs(_cosine(axes, normals[row])) < np.cos(_LEAST_TURN)
         if not turned.any():
             break
-        normals[row[turned]], moved[row[turned]] = axes[turned], True
+        changed = np.zeros(len(points), bool)
+        changed[row[turned]] = True
+        normals[changed] = axes[turned]
+        moved |= changed
     return normals, moved
 
 

@@ -1,10 +1,12 @@
 """Blocks of points that can be worked on one by one, each with all the others that matter to it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..parallel import in_order
 from ..progress import Progress
 
 SIZE = 2000  # points that a block owns, at most, where it has not too many others to heed
@@ -33,14 +35,21 @@ def overlapping_blocks(points: np.ndarray, reach: np.ndarray, progress=None) -> 
     those around them, such as outliers, would do that to the block they are in; they are set aside and split up among
     themselves in the same way.
     """
-    cloud = _Cloud(points, reach, KDTree(points), Progress.of(progress))
+    progress, cloud = Progress.of(progress), _Cloud(points, reach, KDTree(points))
     blocks, left = [], np.arange(len(points))
     while len(left):
-        found = cloud.split(left) or [cloud.block(left)]
+        halved = cloud.halved(left)
+        made = in_order(cloud.uncrowded, progress.part(1 - len(left) / len(points), 1.0).each(_smallest(halved)))
+        found = cloud.joined(halved, (block for _, block in made)) or [cloud.block(left)]
         blocks += found
         left = np.setdiff1d(left, np.concatenate([block.own for block in found]))
-        cloud.progress(1 - len(left) / len(points))
     return blocks
+
+
+def _smallest(halved):
+    """The rows that were not halved further, in order."""
+    rows, halves = halved
+    return [rows] if not halves else [each for half in halves for each in _smallest(half)]
 
 
 @dataclass(frozen=True)
@@ -48,19 +57,30 @@ class _Cloud:
     points: np.ndarray
     reach: np.ndarray
     tree: KDTree
-    progress: Progress
 
-    def split(self, rows: np.ndarray) -> list[Block] | None:
-        """Blocks that own these points or, where some look too far, most of them; None where they are crowded."""
-        if len(rows) > SIZE:
-            x = self.points[rows]
-            order = np.argpartition(x[:, np.ptp(x, axis=0).argmax()], len(rows) // 2)
-            halves = [self.split(half) for half in np.array_split(rows[order], 2)]
-            if None not in halves:
-                return halves[0] + halves[1]
-        self.progress(0.0)
+    def halved(self, rows: np.ndarray) -> tuple:
+        """These rows, and their halves across the longest side in the same form; none where there are few."""
+        if len(rows) <= SIZE:
+            return rows, ()
+        x = self.points[rows]
+        order = np.argpartition(x[:, np.ptp(x, axis=0).argmax()], len(rows) // 2)
+        return rows, [self.halved(half) for half in np.array_split(rows[order], 2)]
+
+    def joined(self, halved: tuple, made: Iterator) -> list[Block] | None:
+        """Blocks that own these points or, where some look too far, most of them, of the smallest ones `made`; None
+        where they are crowded."""
+        rows, halves = halved
+        if halves:
+            found = [self.joined(half, made) for half in halves]
+            if None not in found:
+                return found[0] + found[1]
+        block = self.uncrowded(rows) if halves else next(made)
+        return None if block is None else [block]
+
+    def uncrowded(self, rows: np.ndarray) -> Block | None:
+        """The block that owns those of these points that do not look too far; None where it is crowded."""
         block = self.block(np.sort(rows[self.reach[rows] <= _WIDE * np.median(self.reach[rows])]))
-        return [block] if len(block.members) < _CROWDED * len(block.own) else None
+        return block if len(block.members) < _CROWDED * len(block.own) else None
 
     def block(self, own: np.ndarray) -> Block:
         """A point lies in one of the balls around the own ones exactly where, in a fourth dimension, it is no farther
