@@ -3,7 +3,7 @@
 Among n random samples, one to a square of the local spacing, some leave a disc of sqrt(4 / pi (ln n + ln ln n)) local
 spacings across empty, four of 25,000 (n A exp(-A) is 1 there, A the disc's area). Around an opening the samples at its
 rim follow one another; around a gap in the sampling few look across a wide angle without any, and the patches to its
-two sides meet over it.
+two sides meet over it. In a round one they may all have others to both sides; it is covered from there as well.
 """
 
 from dataclasses import replace
@@ -12,9 +12,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..progress import Progress
-from .borders import Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
+from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
 
 _FEW = 4  # samples in a row that a gap in the sampling may have at its rim
+_ROUND = np.radians(90)  # least angle without neighbours beside a round gap, which no sample sees 130 degrees of
+_NEXT = 2.5  # local spacings from a rim, where openings are not looked across
 _WIDER = 1.5  # bridging lengths, at most, that a gap in the sampling is wide
 _CHANCE = 1.2  # of the width that chance leaves; the spacing beside a gap scatters, too
 _APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
@@ -29,7 +31,9 @@ def with_sampling_gaps_bridged(
     points, normals : (n,3) float64     bend : (n,3,3) of the patches     spacing : (n,) local spacing
     """
     few = chain_lengths(rims, rims.gap) <= _FEW
-    row, widest = np.flatnonzero(rims.gap & ~rims.bridged & few), min(_WIDER * bridge, _left_by_chance(len(points)))
+    rim = rims.gap & ~rims.bridged
+    round_ = ~rims.gap & (rims.opening < np.cos(_ROUND / 2)) & _far_from(rim & ~few, points, spacing)
+    row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(points)))
     distance, other = np.empty(len(row)), np.empty(len(row), np.int64)
     for part in Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points))):
         given = row[part], rims.outward[row[part]], spacing[row[part]]
@@ -37,10 +41,19 @@ def with_sampling_gaps_bridged(
     found = np.isfinite(distance) & few[other]
     row, other, distance = row[found], other[found], distance[found]
     met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance
-    row, distance = row[met], distance[met]
-    bridged, reach = rims.bridged.copy(), rims.reach.copy()
-    bridged[row], reach[row] = True, bridged_reach(distance, spacing[row])
-    return replace(rims, bridged=bridged, reach=reach)
+    row, covered = row[met], bridged_reach(distance[met], spacing[row[met]])
+    further = rims.gap[row] | (covered > DISC * spacing[row])
+    row, covered = row[further], covered[further]
+    gap, bridged, reach = rims.gap.copy(), rims.bridged.copy(), rims.reach.copy()
+    gap[row], bridged[row], reach[row] = True, True, covered
+    return replace(rims, gap=gap, bridged=bridged, reach=reach)
+
+
+def _far_from(rim, points, spacing):
+    """Which samples are not next to one of a rim, (n,) bool."""
+    if not rim.any():
+        return ~rim
+    return KDTree(points[rim]).query(points, workers=-1)[0] > _NEXT * spacing
 
 
 def _left_by_chance(n):

@@ -5,7 +5,7 @@ from scipy.spatial import KDTree
 from core.field import borders, sampling_gaps
 from core.field.borders import find_rims
 from core.field.curvature import bending, tangent_frames
-from core.field.local_surface import patch_neighbours
+from core.field.local_surface import fit_local_surface, patch_neighbours
 from core.field.sampling_gaps import with_sampling_gaps_bridged
 from core.points import local_spacing
 from tests import shapes
@@ -64,6 +64,21 @@ def test_a_round_hole_twice_as_wide_as_the_bridging_length_stays_open():
     assert around.sum() > 5
     assert 6 * np.median(spacing) > 0.4
     np.testing.assert_array_equal(after.bridged, before.bridged)
+
+
+def test_a_round_gap_that_no_sample_sees_a_wide_angle_of_is_covered(random):
+    turn, radius = np.meshgrid(np.arange(12) * np.pi / 6, [1.7, 2.5, 3.4, 4.3, 5.2, 6.1])
+    turn = turn + np.pi / 12 * np.arange(6)[:, None]
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=-1).reshape(-1, 3)
+    points += np.append(0.02 * random.normal(size=(len(points), 2)), np.zeros((len(points), 1)), axis=1)
+    before, after, spacing = before_and_after(points, UP)
+    inner = np.linalg.norm(points, axis=1) < 2
+    assert not before.gap[inner].any()
+    assert after.bridged[inner].sum() >= 5
+    assert (after.reach > spacing)[inner & after.bridged].all()
+    middle = fit_local_surface(points, np.tile(UP, (len(points), 1)), np.ones(len(points)), spacing, 3.0)
+    assert middle.project(np.zeros((1, 3))).distance[0] < 0.1
+    assert open_rim(after)[np.linalg.norm(points, axis=1) > 6].mean() > 0.9
 
 
 def test_patches_that_miss_each_other_halfway_are_not_joined(random):
