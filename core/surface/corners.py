@@ -7,9 +7,9 @@ from .mesh import edges_of
 from .planes import to_planes
 
 _TURN = 0.7  # largest cosine between the sides of sheets that form a corner
-_FACING = -0.9  # below this cosine they run close side by side
+_FACING = -0.97  # below this cosine they run close side by side
 _ABOVE = 0.02  # cells, least height of a vertex over the other sheet's plane
-_FAR = 3.5  # cells, how far a vertex may go
+_FAR = 9.0  # cells, how far a vertex may go
 _OFF, _FARTHEST = 0.25, 1.0  # cells, how far from the surface it may end, and how far from it planes may meet
 _STIFFNESS = 0.01
 _ROUNDS = 4

@@ -64,7 +64,7 @@ def test_quads_split_in_two_do_the_same(junction):
         ([(2, 0), (1, 0), (0, 1), (0, 2)], [UP, 0 * UP, RIGHT, RIGHT]),  # past a rim
         ([(4, 0), (3, 0), (2, 0), (1, 0)], [UP, UP, UP, UP]),  # flat
         ([(4, 0), (3, 0), (3, 1.5), (4, 1.5)], [UP, UP, -UP, -UP]),  # between sheets side by side
-        ([(9, 0), (8, 0), (0, 8), (0, 9)], [UP, UP, RIGHT, RIGHT]),  # far away
+        ([(12, 0), (11, 0), (0, 11), (0, 12)], [UP, UP, RIGHT, RIGHT]),  # far away
         ([(5, 0), (4, 0), (0, 4), (0, 5)], [UP, *LEANING, RIGHT]),  # planes that meet far off the sheets
     ],
     ids=["convex", "rim", "flat", "close", "far", "off"],

@@ -130,7 +130,7 @@ def test_no_border_goes_far(pairs, name):
     before, after, spacing, _ = pairs[name]
     rim = np.unique(border(before))
     moved = np.linalg.norm(after.vertices[rim] - before.vertices[rim], axis=1) / spacing[rim]
-    assert 0.03 < moved.max() < 1.02 * FARTHEST
+    assert 0.03 < moved.max() < 1.05 * FARTHEST
 
 
 @pytest.mark.parametrize("name", CLOUDS)
