@@ -19,16 +19,17 @@ _MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 42.0, "node": 46e-6, "sid
 
 # The same in a band, at resolutions of 256 and 512: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 110.0, "surface": 1.9e-3, "surface with sides": 3.6e-3}  # MiB
-_BAND_NEAR = 3.4, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
+_BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
-# Processor seconds where the probe takes _PROBE of them; measured on the runs that docs/noise.md lists, and at 1024.
-_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.05, 8e-5, 3.1e-4
-_NEAR_NODE, _NODE = 2.8e-6, 2.7e-7
-_BAND_NEAR_NODE, _BAND_NODE = 5e-6, 2.4e-6
-_COVER, _SIDES = 1.7e-5, 6.6e-5  # for a squared cell of the surface: its double cover, and one with its sides told
+# Processor seconds where the probe takes _PROBE of them; fitted to 26 runs over 100 to 100,000 samples, resolutions of
+# 64 to 256, and six in a band, up to 768: estimates are .6 to 1.2 of what was taken.
+_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1.9e-4
+_NEAR_NODE, _NODE = 2.1e-6, 5e-8
+_BAND_NEAR_NODE, _BAND_NODE = 4.3e-6, 1.5e-6
+_COVER, _SIDES = 2.1e-5, 4e-5  # for a squared cell of the surface: its double cover, and one with its sides told
 _PROBE = 0.00387
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
-_NEAR = 2.9  # cells from the surface, besides a spacing, up to which nodes are projected onto it
+_NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def test_noise_costs():
     points = shapes.scattered_sphere(3000)
     grid, spacing = fit_grid(points, 64), local_spacing(points)
     clean, noisy = (estimate_cost(spacing, grid, noisy=noisy).cpu_seconds for noisy in (False, True))
-    assert noisy > clean + 0.5
+    assert noisy > 1.3 * clean
     moved = points + np.random.default_rng(0).normal(size=points.shape) * 0.03
     assert not looks_noisy(points, spacing)
     assert looks_noisy(moved, local_spacing(moved))
