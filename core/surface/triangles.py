@@ -2,7 +2,11 @@
 
 import numpy as np
 
+from .evening import FLAT, vertex_normals
 from .mesh import Mesh
+
+_EVEN = 1.5  # times the other's squared length, that a diagonal may have
+_CURVED = 0.004  # of the length, by which the eightfold rise must differ
 
 
 def mesh_of(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
@@ -14,13 +18,17 @@ def mesh_of(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 def triangles(vertices, faces):
     """Triangles of a mesh of quads: (v,3) vertices, (f,4) faces -> (2f,3); triangles (f,3) come back as they are.
 
-    Each quad is split along its shorter diagonal, but not along an edge that the mesh has already, so an edge-manifold
-    mesh stays one.
+    Each quad is split along the diagonal that runs flatter along the surface, as the normals at its ends tell, or along
+    the shorter one where that is no clear matter, much longer, or the mesh folds; but not along an edge that the mesh has already,
+    so an edge-manifold mesh stays one.
     """
     if faces.shape[1] == 3:
         return faces
-    a, b, c, d = (vertices[faces[:, k]] for k in range(4))
-    other = np.einsum("fi,fi->f", b - d, b - d) < np.einsum("fi,fi->f", a - c, a - c)
+    normal, least = vertex_normals(vertices, faces)
+    (length, rise), (other_length, other_rise) = (_diagonal(vertices, normal, faces[:, k::2]) for k in range(2))
+    told = np.maximum(length, other_length) < _EVEN * np.minimum(length, other_length)
+    told &= (np.abs(rise - other_rise) > _CURVED * np.sqrt(length)) & (least[faces] >= FLAT).all(axis=1)
+    other = np.where(told, other_rise < rise, other_length < length)
     taken = _keys(faces[:, [0, 1, 2, 3]], faces[:, [1, 2, 3, 0]], len(vertices)).reshape(-1)
     diagonals = np.stack(
         [_keys(faces[:, 0], faces[:, 2], len(vertices)), _keys(faces[:, 1], faces[:, 3], len(vertices))], axis=1
@@ -33,6 +41,12 @@ def triangles(vertices, faces):
     other[repeated] = ~other[repeated]
     turned = np.where(other[:, None], np.roll(faces, -1, axis=1), faces)
     return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+
+
+def _diagonal(vertices, normals, ends):
+    """Squared lengths of diagonals between vertices `ends` (f,2), and eight times their rise off the surface."""
+    (a, b), (na, nb) = (each[ends].transpose(1, 0, 2) for each in (vertices, normals))
+    return np.einsum("fi,fi->f", b - a, b - a), np.abs(np.einsum("fi,fi->f", b - a, nb - na))
 
 
 def _keys(tail, head, n):

@@ -20,6 +20,25 @@ def test_the_shorter_diagonal_splits_a_quad(corner, diagonal):
     assert set.intersection(*map(set, faces.tolist())) == diagonal
 
 
+def rhombic_grid(n, bend):
+    """Squares of side .1, n by n, whose diagonals run along and across a cylinder of curvature `bend`."""
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    along, across = 0.1 * np.stack([i + j, i - j]).reshape(2, -1) / np.sqrt(2)
+    vertices = np.stack([along, np.sin(bend * across) / bend, np.cos(bend * across) / bend], axis=1)
+    corner = np.arange(n * n).reshape(n, n)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return vertices, quads, along
+
+
+def test_quads_of_a_cylinder_are_split_along_it():
+    vertices, quads, along = rhombic_grid(12, 1.0)
+    faces = triangles(vertices, quads)
+    inner = ~np.isin(quads, np.flatnonzero(np.bincount(quads.ravel()) < 4)).any(axis=1)
+    first = faces[: len(quads)][inner]
+    split = np.abs(along[first[:, 2]] - along[first[:, 0]])
+    np.testing.assert_allclose(split, 0.1 * np.sqrt(2))
+
+
 def test_the_quads_of_a_mesh_are_those_it_was_made_of():
     """Wound alike, whichever corner comes first."""
     vertices = np.concatenate([SQUARE, SQUARE[1:3] * [2, 1.5, 1]])
