@@ -18,9 +18,9 @@ def mesh_of(vertices: np.ndarray, faces: np.ndarray) -> Mesh:
 def triangles(vertices, faces):
     """Triangles of a mesh of quads: (v,3) vertices, (f,4) faces -> (2f,3); triangles (f,3) come back as they are.
 
-    Each quad is split along the diagonal that runs flatter along the surface, as the normals at its ends tell, or along
-    the shorter one where that is no clear matter, much longer, or the mesh folds; but not along an edge that the mesh has already,
-    so an edge-manifold mesh stays one.
+    Each quad is split along the diagonal that runs flatter along the surface, as the normals at its ends tell; along
+    the shorter one where that is not clear, or much longer, or the mesh folds there; and not along an edge that the
+    mesh has already, so an edge-manifold mesh stays one.
     """
     if faces.shape[1] == 3:
         return faces
