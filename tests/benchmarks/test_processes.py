@@ -42,8 +42,11 @@ def test_none_is_left_at_work_when_the_run_is_killed(how, tmp_path):
 
 def _works(number):
     """Whether a process is there that is no mere entry in the system's table."""
-    status = Path(f"/proc/{number}/stat")
-    return status.exists() and status.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    try:
+        status = Path(f"/proc/{number}/stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):  # the latter where it ends between opening and reading
+        return False
+    return status.rsplit(")", 1)[1].split()[0] != "Z"
 
 
 def _wait_for(met):
