@@ -13,9 +13,9 @@ The paper has no such step. Where there is no crease it changes nothing at all.
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import outer, principal_axes
 from ..progress import Progress
-from .mirrors import Mirrors
+from .mirrors import Mirrors, mirrored
+from .reflection import sweep_once
 
 _NEIGHBOURS = 20  # of a sample, that may lie on its sheet
 _WIDTH = 1.7  # of the Gaussian of their distance, local spacings
@@ -58,8 +58,7 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
 
 def _agreed(mirrors, normals, free):
     """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
-    cosine = _cosine(normals[mirrors.site], mirrors.images(normals))
-    agreed = mirrors.gather @ _alike(cosine)
+    agreed = mirrors.gather @ _alike(mirrors.cosines(normals))
     rise = mirrors.gather @ np.abs(_cosine(normals[mirrors.site], mirrors.direction))
     return agreed, (agreed < _AGREED) & (rise > _STEEP) & free
 
@@ -88,15 +87,14 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, free, agreed, progress
 
 def _across(mirrors, normals):
     """Which neighbours, (p,) bool, have axes unlike those that the samples expect."""
-    return 1 - _cosine(normals[mirrors.site], mirrors.images(normals)) ** 2 > _ACROSS**2
+    return 1 - mirrors.cosines(normals) ** 2 > _ACROSS**2
 
 
 def _settled(mirrors, normals, rows):
     """The axes after sweeps over `rows` (n,) bool alone."""
     normals, here = normals.copy(), mirrors.at(rows)
     for _ in range(_SWEEPS):
-        agreement = here.gather @ outer(here.images(normals)) - here.alignment
-        normals[rows] = principal_axes(agreement[rows])[0]
+        normals[rows] = sweep_once(here, normals, 1, rows)
     return normals
 
 
@@ -106,7 +104,7 @@ def _densest(row, points, spacing, tree, normals, agreed):
     distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
     distance, other = distance[:, 1:], other[:, 1:]
     direction = (points[other] - points[row, None]) / distance[..., None]
-    images = normals[other] - 2 * _cosine(normals[other], direction)[..., None] * direction
+    images = mirrored(normals[other], direction)
     near = np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
     weight = near * np.maximum(agreed[other], np.finfo(float).tiny)
 

@@ -46,8 +46,8 @@ class Mirrors:
         self.alignment = self.gather @ outer(self.direction)
 
     def without(self, cut: np.ndarray) -> "Mirrors":
-        """The same without some of the neighbours, `cut` (p,) bool; samples would keep all of theirs where they would
-        lose more than 85 % of the weight."""
+        """The same without some of the neighbours, `cut` (p,) bool; samples left with hardly any weight
+        keep all of theirs."""
         count = self.gather.shape[0]
         left = np.bincount(self.site, weights=np.where(cut, 0.0, self.weight), minlength=count)
         held = left < _LEFT
@@ -76,10 +76,17 @@ class Mirrors:
 
     def images(self, normals: np.ndarray) -> np.ndarray:
         """(p,3) mirror images of each neighbour's axis in the bisector plane."""
-        axes = normals[self.other]
-        return axes - 2 * np.einsum("pi,pi->p", axes, self.direction)[:, None] * self.direction
+        return mirrored(normals[self.other], self.direction)
+
+    def cosines(self, normals: np.ndarray) -> np.ndarray:
+        """(p,) cosines between each sample's axis and those images."""
+        return np.einsum("pi,pi->p", normals[self.site], self.images(normals))
 
     def confidence(self, normals: np.ndarray) -> np.ndarray:
         """(n,) in [0,1], mean squared cosine between an axis and the mirror images of its neighbours."""
-        cosine = np.einsum("pi,pi->p", normals[self.site], self.images(normals))
-        return np.clip(self.gather @ cosine**2, 0.0, 1.0)
+        return np.clip(self.gather @ self.cosines(normals) ** 2, 0.0, 1.0)
+
+
+def mirrored(axes: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Mirror images of axes (...,3) in planes across unit directions (...,3)."""
+    return axes - 2 * np.einsum("...i,...i->...", axes, direction)[..., None] * direction
