@@ -1,4 +1,4 @@
-"""Principal axes of many symmetric 3x3 tensors at once, in closed form; many small systems; sums of products.
+"""Principal axes of many symmetric 3x3 tensors at once, in closed form; many small systems; products of vectors.
 
 A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis. With another number of
 threads BLAS and LAPACK round differently, OpenBLAS even in systems of three equations, so what results depend on is
@@ -66,6 +66,16 @@ def solve_positive(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
         found[p] -= (rows[p, p + 1 : k] * found[p + 1 :]).sum(axis=0)
         found[p] /= rows[p, p]
     return found.T
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors stored component by component, (3,m) each."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def lengths(a: np.ndarray) -> np.ndarray:
+    """(m,) of vectors stored component by component, (3,m)."""
+    return np.sqrt(np.einsum("im,im->m", a, a))
 
 
 def inner(a: np.ndarray, b: np.ndarray) -> float:

@@ -27,7 +27,7 @@ _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
 _STEP = 0.35  # they may be off each other's plane by this share of their distance
 _FOLD = 0.87  # largest |n_i . n_j| of neighbours with a fold between them
 _FOLD_REACH = 1.5  # both are this close to the crease, local spacings
-_CHUNK = 2048  # samples
+_CHUNK = 512  # samples
 _PAIRS = 500_000
 _STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
 

@@ -9,7 +9,7 @@ from .borders import DISC
 from .grid import Grid
 from .local_surface import LocalSurface
 
-_MARGIN = 0.25  # cells, for surfaces blended of patches that differ
+_MARGIN = 0.1  # cells, for surfaces blended of patches that differ
 _PIECE = 1 << 16  # pairs of sample and node at a time
 _OFTEN = 40.0  # times that each node is asked, on average; a distance transform is quicker then
 _WIDE = 0.25  # of the box, that the patch of a sample reaches
@@ -23,7 +23,7 @@ def sample_reach(surface: LocalSurface) -> np.ndarray:
 
 def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -> np.ndarray:
     """Flat indices (b,), ascending, of the nodes that may lie within `width` cells of the surface: those as close, and
-    a quarter of a cell more, to the disc of any sample, thickened by what the patch bends away from it. Where the discs
+    a tenth of a cell more, to the disc of any sample, thickened by what the patch bends away from it. Where the discs
     of dense or of few samples would have every node asked many times, all nodes as close to a ball around the disc."""
     progress, reach = Progress.of(progress), sample_reach(surface) / grid.spacing
     span = np.ceil(reach + width + _MARGIN).astype(np.int64)

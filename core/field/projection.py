@@ -19,6 +19,7 @@ CHUNK = 8192  # queries at a time
 UNCOVERED = 1.5  # the surface is never further from its nearest sample than this, local spacings (or the bridged reach)
 
 _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
+_BESIDE = 0.3  # local spacings, at most, that a foot point lies off such a patch
 _MEMBERSHIP = 8.0  # how fast samples off each other's plane stop counting as one sheet
 _OTHER_SHEETS = 2  # at most, beside that of the nearest sample
 TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
@@ -82,6 +83,7 @@ class Nearby:
     """The patches of each query's nearest samples, as the query sees them; float32 but for `sample` and `distance`.
 
     sample   : (m,k)                                     distance : (m,k) float64, ascending
+    spacing  : (m,k) local spacing of the sample
     offset   : (3,m,k) from the sample to the query      normals  : (3,m,k)
     height   : (m,k) along the normal                    above    : (m,k) over the bent patch
     kernel   : (m,k) diffusion kernel                    pull     : (m,k) its slope along the normal
@@ -90,6 +92,7 @@ class Nearby:
 
     sample: np.ndarray
     distance: np.ndarray
+    spacing: np.ndarray
     offset: np.ndarray
     normals: np.ndarray
     height: np.ndarray
@@ -106,7 +109,7 @@ class Nearby:
 def _project(surface, x, nearest):
     near = _nearby(surface, x, nearest)
     found, step, past_rim, member, _ = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
-    apart = np.abs(near.height) - _SAG * surface.columns.spacing[near.sample]
+    apart = np.abs(near.height) - _SAG * near.spacing
     rest = (member <= MEMBER) & (surface.confidence[near.sample] >= TRUSTED)
     for _ in range(_OTHER_SHEETS):
         rest &= apart < found[:, None]
@@ -147,9 +150,8 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     bent = np.stack([_dot(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
     above = (height - 0.5 * _dot(lateral, bent)) / np.sqrt(1 + _dot(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height)
-    return Nearby(
-        sample, distance, offset, normals, height, above, kernel, pull, *excess(surface.rims, sample, lateral, spacing)
-    )
+    patch = excess(surface.rims, sample, lateral, spacing)
+    return Nearby(sample, distance, spacing, offset, normals, height, above, kernel, pull, *patch)
 
 
 def _onto_sheet(surface, near, anchor):
@@ -183,7 +185,8 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     weight *= cosine
     tau = np.einsum("mk,mk->m", weight, near.above) / np.einsum("mk,mk->m", weight, cosine)
 
-    covers = (np.abs(cosine) > _PARALLEL) & (member > MEMBER)
+    missed = np.abs(near.above - tau[:, None].astype(np.float32) * cosine)
+    covers = (np.abs(cosine) > _PARALLEL) & (member > MEMBER) & (missed < _BESIDE * near.spacing)
     covers[every, anchor] |= ~covers.any(axis=1)
     best = np.where(covers, near.beyond, np.inf).argmin(axis=1)
     return SheetFoot(tau, axis, near.beyond[every, best], near.outward[:, every, best].T, member)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..parallel import in_order
 from ..progress import Progress
 from .borders import RIM, Rims, chain_lengths, one_sheet
 
@@ -27,7 +28,7 @@ _STEEPEST, _HALVINGS = 2.0, 8  # of the line's slope, and steps to find it
 _BEYOND = 0.07  # the rim lies this far past the line, local spacings
 _FARTHEST = 1.5  # and at most this far past a sample
 _REACH, _LINES = 2.0, 4  # local spacings from a line's sample to others it bounds; lines tried for each
-_CHUNK = 4096  # rim samples
+_CHUNK = 512  # rim samples
 
 
 def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=None) -> Rims:
@@ -41,8 +42,11 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     row = np.flatnonzero(rim & (chain_lengths(rims, rim) >= _CHAIN))
     if not len(row):
         return rims
-    parts = [row[part] for part in progress.chunks(len(row), _CHUNK)]
-    lines = [_lines(part, rims.outward[part], points, normals, spacing, tree) for part in parts]
+
+    def lay(part):
+        return _lines(row[part], rims.outward[row[part]], points, normals, spacing, tree)
+
+    lines = [found for _, found in in_order(lay, progress.chunks(len(row), _CHUNK))]
     lines = _Lines(row, *(np.concatenate(each) for each in zip(*lines, strict=True)))
     margin = rims.margin.copy()
     size = spacing[row]

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
 
@@ -35,9 +36,13 @@ def with_sampling_gaps_bridged(
     round_ = ~rims.gap & (rims.opening < np.cos(_ROUND / 2)) & _far_from(rim & ~few, points, spacing)
     row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(points)))
     distance, other = np.empty(len(row)), np.empty(len(row), np.int64)
-    for part in Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points))):
-        given = row[part], rims.outward[row[part]], spacing[row[part]]
-        distance[part], other[part] = across_gaps(*given, points, normals, tree, widest)
+
+    def look(part):
+        return across_gaps(row[part], rims.outward[row[part]], spacing[row[part]], points, normals, tree, widest)
+
+    chunks = Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points)))
+    for part, found in in_order(look, chunks):
+        distance[part], other[part] = found
     found = np.isfinite(distance) & few[other]
     row, other, distance = row[found], other[found], distance[found]
     met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance

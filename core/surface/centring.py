@@ -10,7 +10,7 @@ import numpy as np
 
 from ..parallel import in_order
 from .evening import FLAT, vertex_normals
-from .mesh import Mesh
+from .mesh import Mesh, at_corners
 
 
 def centred(mesh: Mesh) -> Mesh:
@@ -29,9 +29,8 @@ def centred(mesh: Mesh) -> Mesh:
     (normal, least), (edges, counts), area = (found for _, found in in_order(lambda look: look(), looks))
     free = least >= FLAT
     free[edges[counts != 2]] = False
-    off = np.zeros(len(faces))
-    for a, b in zip(faces.T, np.roll(faces, -1, axis=1).T, strict=True):
-        off += np.einsum("fi,fi->f", vertices[b] - vertices[a], normal[b] - normal[a]) / 18
+    place, turned = at_corners(vertices, faces), at_corners(normal, faces)
+    off = sum(np.einsum("if,if->f", place[k] - place[k - 1], turned[k] - turned[k - 1]) for k in range(3)) / 18
     off[(least < FLAT)[faces].any(axis=1)] = 0.0
     share, total = (np.bincount(faces.reshape(-1), np.repeat(x, 3), len(vertices)) for x in (area * off, area))
     step = np.where(free, 0.5 * share / np.maximum(total, np.finfo(float).tiny), 0.0)

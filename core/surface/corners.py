@@ -27,10 +27,11 @@ def into_corners(vertices, faces, side, surface: LocalSurface, cell: float, prog
     for instance.
     """
     (low, high), _ = edges_of(faces, len(vertices))
-    way = vertices[high] - vertices[low]
     turn = np.einsum("ei,ei->e", side[low], side[high])
-    concave = (turn > _FACING) & (turn < _TURN)
-    concave &= np.einsum("ei,ei->e", way, side[low]) > _ABOVE * cell
+    bent = (turn > _FACING) & (turn < _TURN)
+    low, high = low[bent], high[bent]
+    way = vertices[high] - vertices[low]
+    concave = np.einsum("ei,ei->e", way, side[low]) > _ABOVE * cell
     concave &= np.einsum("ei,ei->e", way, side[high]) < -_ABOVE * cell
     row, ends = np.unique(np.stack([low[concave], high[concave]]), return_inverse=True)
     low, high = ends.reshape(2, -1)

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .mesh import edges_of
+from ..linalg import cross, lengths
+from .mesh import at_corners, edges_of
 
 _ROUNDS, _DAMPING = 5, 0.5
 FLAT = 0.9  # least cosine between the normals of a vertex and of each face around it, where it may move
@@ -24,24 +25,26 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     free = np.flatnonzero(free)
     links = coo_matrix((np.ones(2 * len(tail)), (np.append(tail, head), np.append(head, tail))), shape=(n, n)).tocsr()
     links, normal, moved = links[free], normal[free], vertices.copy()
-    degree = np.diff(links.indptr)[:, None]
+    links.data /= np.repeat(np.diff(links.indptr), np.diff(links.indptr))
+    here = moved[free]
     for _ in range(_ROUNDS):
-        step = links @ moved / degree - moved[free]
-        moved[free] += _DAMPING * (step - np.einsum("vi,vi->v", step, normal)[:, None] * normal)
+        step = links @ moved
+        step -= here
+        step -= np.einsum("vi,vi->v", step, normal)[:, None] * normal
+        step *= _DAMPING
+        here += step
+        moved[free] = here
     return moved
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit normals (v,3) of the vertices, by area, and the least cosine between each and those of its faces, (v,)."""
-    n = len(vertices)
-    first, second = (0, 2), (1, 3 % faces.shape[1])  # of a quad the diagonals, of a triangle two sides
-    along, across = (vertices[faces[:, b]] - vertices[faces[:, a]] for a, b in (first, second))
-    face = np.cross(along, across)
-    normal = np.stack([sum(np.bincount(corner, x, n) for corner in faces.T) for x in face.T], axis=1)
-    normal, face = (
-        x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), np.finfo(float).tiny) for x in (normal, face)
-    )
+    n, corners, places = len(vertices), faces.T.astype(np.intp), at_corners(vertices, faces)
+    start, end = (0, 1), (2, 3 % len(corners))  # of the diagonals of a quad, of two sides of a triangle
+    face = cross(*(places[b] - places[a] for a, b in zip(start, end, strict=True)))
+    normal = np.stack([sum(np.bincount(corner, x, n) for corner in corners) for x in face])
+    normal, face = (x / np.maximum(lengths(x), np.finfo(float).tiny) for x in (normal, face))
     least = np.ones(n)
-    for corner in faces.T:
-        np.minimum.at(least, corner, np.einsum("fi,fi->f", face, normal[corner]))
-    return normal, least
+    for corner in corners:
+        np.minimum.at(least, corner, np.einsum("if,if->f", face, normal.take(corner, axis=1)))
+    return normal.T.copy(), least

@@ -6,6 +6,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..linalg import cross, lengths
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -56,8 +58,14 @@ class Mesh:
 
     def face_areas(self) -> np.ndarray:
         """(f,) float64, square input units."""
-        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
-        return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        a, b, c = at_corners(self.vertices, self.faces)
+        return 0.5 * lengths(cross(b - a, c - a))
+
+
+def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
+    """Rows of x (v,3) at each corner of triangles or quads (f,k), k arrays (3,f), component by component."""
+    columns = x.T.copy()
+    return [np.stack([column.take(corner) for column in columns]) for corner in faces.T.astype(np.intp)]
 
 
 def edges_of(faces: np.ndarray, n: int) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:

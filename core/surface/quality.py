@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .mesh import Mesh
+from .mesh import Mesh, at_corners
 
 _SMALL = 5.0  # degrees
 _ZERO_AREA = 1e-6  # of the mean face area
@@ -21,8 +21,8 @@ def triangle_quality(mesh: Mesh) -> dict:
     names = "min_angle", "least_angle", "small_angles", "aspect_p95", "zero_area"
     if not len(mesh.faces):
         return dict.fromkeys(names)
-    corners = [mesh.vertices[mesh.faces[:, k]] for k in range(3)]
-    squares = [((corners[k] - corners[k - 1]) ** 2).sum(axis=1) for k in range(3)]
+    corners = at_corners(mesh.vertices, mesh.faces)
+    squares = [((corners[k] - corners[k - 1]) ** 2).sum(axis=0) for k in range(3)]
     short, middle, long = np.sort(squares, axis=0)
     areas = mesh.face_areas()
     angles = np.degrees(np.arctan2(4 * areas, middle + long - short))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .evening import FLAT, vertex_normals
-from .mesh import Mesh
+from .mesh import Mesh, at_corners
 
 _EVEN = 1.5  # times the other's squared length, that a diagonal may have
 _CURVED = 0.004  # of the length, by which the eightfold rise must differ
@@ -25,7 +25,8 @@ def triangles(vertices, faces):
     if faces.shape[1] == 3:
         return faces
     normal, least = vertex_normals(vertices, faces)
-    (length, rise), (other_length, other_rise) = (_diagonal(vertices, normal, faces[:, k::2]) for k in range(2))
+    places, normals = at_corners(vertices, faces), at_corners(normal, faces)
+    (length, rise), (other_length, other_rise) = (_diagonal(places[k::2], normals[k::2]) for k in range(2))
     told = np.maximum(length, other_length) < _EVEN * np.minimum(length, other_length)
     told &= (np.abs(rise - other_rise) > _CURVED * np.sqrt(length)) & (least[faces] >= FLAT).all(axis=1)
     other = np.where(told, other_rise < rise, other_length < length)
@@ -33,7 +34,7 @@ def triangles(vertices, faces):
     diagonals = np.stack(
         [_keys(faces[:, 0], faces[:, 2], len(vertices)), _keys(faces[:, 1], faces[:, 3], len(vertices))], axis=1
     )
-    clash = np.isin(diagonals, taken)
+    clash = np.isin(diagonals, np.intersect1d(diagonals, taken))
     other = np.where(clash[:, 0] != clash[:, 1], clash[:, 0], other)
     chosen = np.take_along_axis(diagonals, other[:, None].astype(int), axis=1)[:, 0]
     _, first, count = np.unique(chosen, return_index=True, return_counts=True)
@@ -43,10 +44,11 @@ def triangles(vertices, faces):
     return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
 
 
-def _diagonal(vertices, normals, ends):
-    """Squared lengths of diagonals between vertices `ends` (f,2), and eight times their rise off the surface."""
-    (a, b), (na, nb) = (each[ends].transpose(1, 0, 2) for each in (vertices, normals))
-    return np.einsum("fi,fi->f", b - a, b - a), np.abs(np.einsum("fi,fi->f", b - a, nb - na))
+def _diagonal(places, normals):
+    """Squared lengths (f,) of diagonals, and eight times their rise off the surface, from their two ends (3,f) each and
+    the normals there."""
+    (a, b), (na, nb) = places, normals
+    return np.einsum("if,if->f", b - a, b - a), np.abs(np.einsum("if,if->f", b - a, nb - na))
 
 
 def _keys(tail, head, n):
