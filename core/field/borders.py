@@ -30,6 +30,7 @@ _FOLD_REACH = 1.5  # both are this close to the crease, local spacings
 _CHUNK = 512  # samples
 _PAIRS = 500_000
 _STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
+_OWN = 0.77  # if their |n_i . n_j| is more than this: at 45 degrees those beyond the crease lie flat, too
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     step = points[neighbours] - points[part, None]
     flat = one_sheet(step, own[:, None], theirs)
     folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
-    crease, limit = _creases(step, flat, folded, toward, line, spacing)
+    crease, limit = _creases(step, flat & _aligned(own[:, None], theirs, _OWN), folded, toward, line, spacing)
     x, y = np.moveaxis(np.einsum("nki,nai->nka", np.where(folded[..., None], lateral, step), frames), 2, 0)
     same = flat | folded
 
@@ -192,11 +193,12 @@ def _unfolded(step, normals, other_normals, spacing, candidate):
     return folded, (line + other_line)[..., None] * across + slide[..., None] * along, across, line
 
 
-def _creases(step, flat, folded, toward, line, spacing):
-    """The nearest crease and the nearest one in another direction, (n,2,3), with their distances, (n,2)."""
+def _creases(step, own, folded, toward, line, spacing):
+    """The nearest crease that no neighbour of the `own` sheet, (n,k) bool, lies beyond, and the nearest one in another
+    direction, (n,2,3), with their distances, (n,2)."""
     margin = line + _STRAIGHT_ON * spacing[:, None]
     runs = np.einsum("nji,nki->njk", step, toward)
-    crossed = ((runs > margin[:, None]) & flat[:, :, None]).any(axis=1)
+    crossed = ((runs > margin[:, None]) & own[:, :, None]).any(axis=1)
     distance = np.where(folded & ~crossed, line, np.inf)
     every = np.arange(len(step))
     first = distance.argmin(axis=1)

@@ -1,8 +1,11 @@
 """Concave corners: between sheets that meet, faces lead from one sheet straight to the other."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..field.local_surface import LocalSurface
+from ..progress import Progress
 from .mesh import edges_of
 from .planes import to_planes
 
@@ -12,6 +15,10 @@ _ABOVE = 0.02  # cells, least height of a vertex over the other sheet's plane
 _FAR = 9.0  # cells, how far a vertex may go
 _OFF, _FARTHEST = 0.25, 1.0  # cells, how far from the surface it may end, and how far from it planes may meet
 _STIFFNESS = 0.01
+_ADVANCES, _ADVANCE = 4, 0.4  # times that planes are laid again, and the share of the way that is gone each time
+_MET = 0.05  # cells, off the surface, where the first planes meet well enough
+_LIFT = 0.3  # cells, off the sheet, so that the feet tell its side
+_SAME = 0.7  # least cosine between normals of one sheet there
 _ROUNDS = 4
 
 
@@ -35,18 +42,45 @@ def into_corners(vertices, faces, side, surface: LocalSurface, cell: float, prog
     concave &= np.einsum("ei,ei->e", way, side[high]) < -_ABOVE * cell
     row, ends = np.unique(np.stack([low[concave], high[concave]]), return_inverse=True)
     low, high = ends.reshape(2, -1)
-    place, side = vertices[row], side[row]
-    corner, other = np.append(low, high), np.append(high, low)
-    planes = np.append(corner, other)
-    step = to_planes(place, np.append(corner, corner), place[planes], side[planes], _STIFFNESS)
-    found = surface.project(place + step, progress)
-    step = np.where((found.distance > _OFF * cell)[:, None], step - found.step, step)
+    step, off = _to_meetings(
+        vertices[row], side[row], np.append(low, high), np.append(high, low), surface, cell, progress
+    )
     length = np.linalg.norm(step, axis=1)
-    length[(length > _FAR * cell) | (found.distance > _FARTHEST * cell)] = np.inf
+    length[(length > _FAR * cell) | (off > _FARTHEST * cell)] = np.inf
     chosen = _closest_ends(low, high, length)
     moved = vertices.copy()
     moved[row[chosen]] += step[chosen]
     return moved
+
+
+def _to_meetings(place, side, corner, other, surface, cell, progress):
+    """Steps (v,3) from places (v,3) of sheets with normals `side` (v,3) to where their planes and those at the other
+    ends of their edges meet, and how far off the surface that is, (v,).
+
+    corner, other : (c,) int, the ends of each edge, once either way
+
+    Sheets bend on the way, so planes are laid again at the feet of places part of the way there and a little off the
+    sheet, while these are on the same sheet. The meeting of those counts where that of the first is off the surface and
+    theirs is closer.
+    """
+    progress, both, planes = Progress.of(progress), np.append(corner, corner), np.append(corner, other)
+    ends = np.linspace(0, 1, _ADVANCES + 3)
+    first, *between, last = (progress.part(*part) for part in pairwise(ends))
+    step = to_planes(place, both, place[planes], side[planes], _STIFFNESS)
+    found = surface.project(place + step, first)
+    at, normal, further, share = place, side, step, np.full((len(place), 1), _ADVANCE)
+    for part in between:
+        x = at + share * (place + further - at) + _LIFT * cell * normal
+        near = surface.project(x, part)
+        fresh = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
+        same = ((np.einsum("vi,vi->v", fresh, normal) > _SAME) & ~near.past_rim)[:, None]
+        at, normal, share = np.where(same, x - near.step, at), np.where(same, fresh, normal), share * (1 - 0.5 * ~same)
+        further = to_planes(place, both, at[planes], normal[planes], _STIFFNESS)
+    there = surface.project(place + further, last)
+    better = (found.distance > _MET * cell) & (there.distance < found.distance)
+    step, onto = (np.where(better[:, None], *pair) for pair in ((further, step), (there.step, found.step)))
+    off = np.where(better, there.distance, found.distance)
+    return np.where((off > _OFF * cell)[:, None], step - onto, step), off
 
 
 def _closest_ends(low, high, length):

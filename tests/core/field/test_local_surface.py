@@ -132,6 +132,25 @@ def test_three_sheets_that_meet_in_a_line_are_not_blended_into_a_fourth():
     assert (true - surface.project(x).distance > 0.2 * size).mean() < 0.015
 
 
+@pytest.mark.parametrize("degrees", [45, 50, 60, 90])
+def test_neither_sheet_goes_on_past_a_crease(degrees):
+    """At 45 and 50 degrees, between patches that count as parallel and patches that do not."""
+    rng, turn = np.random.default_rng(0), np.radians(degrees)
+    down = np.array([np.cos(turn), 0, -np.sin(turn)])
+    across, flat = rng.uniform(0, 2, (3000, 1)), rng.random((3000, 1)) < 0.5
+    points = across * np.where(flat, [-1, 0, 0], down) + rng.uniform(-1, 1, (3000, 1)) * [0, 1, 0]
+    surface = fit(points, np.where(flat, UP, np.cross(down, [0, 1, 0])))
+    size = np.median(surface.spacing)
+    x = rng.uniform(-1, 1, (6000, 3)) * [1.5 * size, 0.8, 1.5 * size]
+    true = np.minimum(np.hypot(np.maximum(x[:, 0], 0), x[:, 2]), np.linalg.norm(x - _onto(x, down), axis=1))
+    assert (true - surface.project(x).distance > 0.15 * size).mean() < 0.02
+
+
+def _onto(x, down):
+    """The feet of x on the half-plane that begins at the y axis and leads `down` from there."""
+    return np.maximum(x @ down, 0)[:, None] * down + x * [0, 1, 0]
+
+
 def test_no_queries():
     points, normals, _ = SHAPES["disc"]
     assert fit(points, normals).project(np.empty((0, 3))).distance.shape == (0,)

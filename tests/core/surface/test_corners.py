@@ -65,13 +65,21 @@ def test_quads_split_in_two_do_the_same(junction):
         ([(4, 0), (3, 0), (2, 0), (1, 0)], [UP, UP, UP, UP]),  # flat
         ([(4, 0), (3, 0), (3, 1.5), (4, 1.5)], [UP, UP, -UP, -UP]),  # between sheets side by side
         ([(12, 0), (11, 0), (0, 11), (0, 12)], [UP, UP, RIGHT, RIGHT]),  # far away
-        ([(5, 0), (4, 0), (0, 4), (0, 5)], [UP, *LEANING, RIGHT]),  # planes that meet far off the sheets
     ],
-    ids=["convex", "rim", "flat", "close", "far", "off"],
+    ids=["convex", "rim", "flat", "close", "far"],
 )
 def test_all_else_stays(columns, sides, junction):
     vertices, faces = strip(*columns)
     assert (cells_moved(vertices, faces, np.tile(sides, (ROWS, 1)), junction) == 0).all()
+
+
+def test_sheets_that_end_before_their_planes_meet_stay_apart():
+    far = np.stack(np.meshgrid(np.arange(3 * CELL, 1, 0.03), np.arange(-0.6, 0.6, 0.03)), axis=2).reshape(-1, 2)
+    flat, upright = np.column_stack([far, 0 * far[:, 0]]), np.column_stack([0 * far[:, 0], far[:, ::-1]])
+    points, normals = np.concatenate([flat, upright]), np.repeat([UP, RIGHT], len(far), axis=0)
+    surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 1.0)
+    vertices, faces = strip((5, 0), (4, 0), (0, 4), (0, 5))
+    assert (cells_moved(vertices, faces, np.tile([UP, UP, RIGHT, RIGHT], (ROWS, 1)), surface) == 0).all()
 
 
 def test_where_planes_meet_off_the_surface_the_foot_of_that_place_is_taken(junction):
@@ -79,6 +87,24 @@ def test_where_planes_meet_off_the_surface_the_foot_of_that_place_is_taken(junct
     moved = into_corners(vertices, faces, np.tile([UP, *LEANING, RIGHT], (ROWS, 1)), junction, CELL)
     assert (moved != vertices).any(axis=1).sum() >= ROWS
     assert (junction.project(moved).distance <= 0.1 * CELL).all()
+
+
+def test_between_sheets_that_bend_the_corner_is_found_where_they_meet():
+    """Two cylinders around (-+.8, 0) that cross at (0, .6). Their tangent planes meet a cell off the surface."""
+    turn, y = np.linspace(0, 2 * np.pi, 200, endpoint=False), np.arange(-0.6, 0.6, 0.03)
+    circle = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
+    circles = [circle[x * (x + circle[:, 0]) > 0] + [x, 0, 0] for x in (-0.8, 0.8)]
+    points = np.concatenate([np.add(ring, [0, each, 0]) for ring in circles for each in y])
+    normals = points * [1, 0, 1] - np.where(points[:, :1] < 0, [-0.8, 0, 0], [0.8, 0, 0])
+    surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
+
+    z = np.array([0.95, 0.85, 0.85, 0.95])
+    x = (0.8 - np.sqrt(1 - z**2)) * [-1, -1, 1, 1]
+    vertices, faces = strip(*np.column_stack([x, z]) / CELL)
+    side = np.tile(np.column_stack([x - 0.8 * np.sign(x), 0 * x, z]), (ROWS, 1))
+    moved = into_corners(vertices, faces, side, surface, CELL).reshape(ROWS, 4, 3)
+    lowest = moved[2:-2, np.abs(moved[2, :, 0]).argmin()]
+    np.testing.assert_allclose(lowest[:, [0, 2]], np.tile([0, 0.6], (ROWS - 4, 1)), atol=0.25 * CELL)
 
 
 def test_the_cover_reaches_into_the_corners_of_a_junction():
