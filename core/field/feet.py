@@ -11,6 +11,7 @@ from .local_surface import LocalSurface, Projection
 from .projection import FROM_NODES
 
 SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
+_AGREED = 0.02  # cells, spread of patches over which a foot point needs no second look
 _SETTLED = 0.1  # cells, residual of a foot point that counts
 _RADIUS = 0.6  # cells, a foot point stands for a disc of this radius
 _CLOSE, _CLOSER = 0.5, 0.1  # cells: beyond the first from the surface, feet count that are this much closer
@@ -63,16 +64,19 @@ class Feet:
 
 
 def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, progress) -> tuple[np.ndarray, Feet]:
-    """Nodes close to the surface whose foot points survive a second projection, (s,) of `node` (b,), and those feet.
+    """Nodes close to the surface whose foot points are on it, (s,) of `node` (b,), and those feet: after a second
+    projection, but where all patches agreed on the first.
 
     near : where the nodes fall on the surface
     """
     seed = near.distance <= SEED_BAND * grid.spacing
     node, near = node[seed], near[seed]
-    feet = grid.positions(node) - near.step
-    again = surface.project(feet, progress, FROM_NODES)
-    kept = again.distance <= _SETTLED * grid.spacing
-    node, near, feet = node[kept], near[kept], feet[kept] - again.step[kept]
+    feet, kept = grid.positions(node) - near.step, np.ones(len(node), bool)
+    doubtful = np.flatnonzero(near.spread > _AGREED * grid.spacing)
+    again = surface.project(feet[doubtful], progress, FROM_NODES)
+    feet[doubtful] -= again.step
+    kept[doubtful] = again.distance <= _SETTLED * grid.spacing
+    node, near, feet = node[kept], near[kept], feet[kept]
     normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
     radius = np.where(near.past_rim, 0.0, _RADIUS * grid.spacing)
     return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in (feet, normals, radius)))

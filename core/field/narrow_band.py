@@ -6,6 +6,8 @@ near; of what remains the distance next to the surface is the projection's, and 
 nodes there, both as in the whole box (see :mod:`.integration`).
 """
 
+from dataclasses import fields
+
 import numpy as np
 
 from ..progress import Progress
@@ -116,8 +118,8 @@ def _projected(surface, grid, corner, sample, progress):
         found.append((node[inside], projection[inside]))
     node = np.concatenate([node for node, _ in found])
     order = np.argsort(node)
-    fields = ([getattr(near, name) for _, near in found] for name in ("distance", "step", "past_rim"))
-    return node[order], Projection(*(np.concatenate(parts)[order] for parts in fields))
+    parts = ([getattr(near, field.name) for _, near in found] for field in fields(Projection))
+    return node[order], Projection(*(np.concatenate(each)[order] for each in parts))
 
 
 def _feet(surface, grid, node, near, progress):

@@ -37,14 +37,21 @@ class Projection:
     distance : (m,) float64, to the surface
     step     : (m,3) float64, from the foot point to the query
     past_rim : (m,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
+    spread   : (m,) float32, how far the patches it was found with are off it, root mean square; inf past rims, and
+               where samples of other sheets are near
     """
 
     distance: np.ndarray
     step: np.ndarray
     past_rim: np.ndarray
+    spread: np.ndarray
 
     def __getitem__(self, chosen) -> "Projection":
-        return Projection(self.distance[chosen], self.step[chosen], self.past_rim[chosen])
+        return Projection(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def __setitem__(self, chosen, found: "Projection"):
+        for field in fields(self):
+            getattr(self, field.name)[chosen] = getattr(found, field.name)
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,7 @@ class SheetFoot:
     tau    : (m,) float64, offset of the query along `axis`     axis    : (m,3) float64, unit normal of the sheet
     beyond : (m,) float32, how far past the sheet's rim         outward : (m,3) float32, the step past it
     member : (m,k) float32 in [0,1], how surely each sample near the query belongs to the sheet
+    spread : (m,) how far the patches are off the foot, root mean square
     """
 
     tau: np.ndarray
@@ -61,6 +69,7 @@ class SheetFoot:
     beyond: np.ndarray
     outward: np.ndarray
     member: np.ndarray
+    spread: np.ndarray
 
 
 def project(surface, x: np.ndarray, progress: Progress, nearest: int = NEAREST) -> Projection:
@@ -71,10 +80,10 @@ def project(surface, x: np.ndarray, progress: Progress, nearest: int = NEAREST) 
     patch is added at a right angle. Of the sheets that the nearest samples belong to, the closest counts. Accurate
     within a few local spacings of the surface; never more than the distance to the nearest sample.
     """
-    found = Projection(np.empty(len(x)), np.empty((len(x), 3)), np.empty(len(x), bool))
-    chunks = progress.chunks(len(x), CHUNK)
-    for part, piece in in_order(lambda part: _project(surface, x[part], nearest), chunks):
-        found.distance[part], found.step[part], found.past_rim[part] = piece
+    m = len(x)
+    found = Projection(np.empty(m), np.empty((m, 3)), np.empty(m, bool), np.empty(m, np.float32))
+    for part, piece in in_order(lambda part: _project(surface, x[part], nearest), progress.chunks(m, CHUNK)):
+        found[part] = piece
     return found
 
 
@@ -108,18 +117,17 @@ class Nearby:
 
 def _project(surface, x, nearest):
     near = _nearby(surface, x, nearest)
-    found, step, past_rim, member, _ = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
+    found, member, _ = _onto_sheet(surface, near, np.zeros(len(x), np.int64))
     apart = np.abs(near.height) - _SAG * near.spacing
     rest = (member <= MEMBER) & (surface.confidence[near.sample] >= TRUSTED)
     for _ in range(_OTHER_SHEETS):
-        rest &= apart < found[:, None]
+        rest &= apart < found.distance[:, None]
         row, anchor = _first_of_rows(rest)
-        other, other_step, other_rim, member, straight = _onto_sheet(surface, near.rows(row), anchor)
-        closer = (other < found[row]) & straight
-        chosen = row[closer]
-        found[chosen], step[chosen], past_rim[chosen] = other[closer], other_step[closer], other_rim[closer]
+        other, member, straight = _onto_sheet(surface, near.rows(row), anchor)
+        closer = (other.distance < found.distance[row]) & straight
+        found[row[closer]] = other[closer]
         rest[row] &= member <= MEMBER
-    return found, step, past_rim
+    return found
 
 
 def membership(between, own, normals) -> np.ndarray:
@@ -155,8 +163,8 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
 
 
 def _onto_sheet(surface, near, anchor):
-    """Distance, step and whether past a rim, for the sheet of each query's sample number `anchor` (m,); how surely each
-    sample belongs to that sheet, (m,k); and whether the sheet runs there as at that sample, (m,) bool."""
+    """Where queries fall on the sheet of their sample number `anchor` (m,); how surely each sample belongs to that
+    sheet, (m,k); and whether the sheet runs there as at that sample, (m,) bool."""
     every = np.arange(len(near.sample))
     foot = sheet_foot(near, anchor)
     step = foot.tau[:, None] * foot.axis + foot.outward
@@ -169,8 +177,11 @@ def _onto_sheet(surface, near, anchor):
     step[lifted] = near.offset[:, every, anchor].T[lifted]
     found[lifted] = away[lifted]
     step *= (bounded / np.maximum(found, _TINY))[:, None]
+    past_rim = foot.beyond > 0
+    clear = ~past_rim & (bounded == found) & (foot.member.min(axis=1) > MEMBER)
     cosine = np.einsum("im,mi->m", near.normals[:, every, anchor], foot.axis)
-    return bounded, step, foot.beyond > 0, foot.member, np.abs(cosine) > _STRAIGHT
+    projection = Projection(bounded, step, past_rim, np.where(clear, foot.spread, np.float32(np.inf)))
+    return projection, foot.member, np.abs(cosine) > _STRAIGHT
 
 
 def sheet_foot(near: Nearby, anchor) -> SheetFoot:
@@ -182,14 +193,15 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     weight /= np.einsum("mk->m", weight)[:, None]
     axis = fused_axes(weight, near.pull, near.normals)
     cosine = _dot(near.normals, axis.T.astype(np.float32)[:, :, None])
-    weight *= cosine
-    tau = np.einsum("mk,mk->m", weight, near.above) / np.einsum("mk,mk->m", weight, cosine)
+    towards = weight * cosine
+    tau = np.einsum("mk,mk->m", towards, near.above) / np.einsum("mk,mk->m", towards, cosine)
 
     missed = np.abs(near.above - tau[:, None].astype(np.float32) * cosine)
+    spread = np.sqrt(np.einsum("mk,mk,mk->m", weight, missed, missed))
     covers = (np.abs(cosine) > _PARALLEL) & (member > MEMBER) & (missed < _BESIDE * near.spacing)
     covers[every, anchor] |= ~covers.any(axis=1)
     best = np.where(covers, near.beyond, np.inf).argmin(axis=1)
-    return SheetFoot(tau, axis, near.beyond[every, best], near.outward[:, every, best].T, member)
+    return SheetFoot(tau, axis, near.beyond[every, best], near.outward[:, every, best].T, member, spread)
 
 
 def _first_of_rows(marked):

@@ -49,6 +49,25 @@ def test_never_beyond_the_nearest_sample_and_never_negative(points, normals, tru
     assert (distance <= KDTree(points).query(x)[0] + 1e-12).all()
 
 
+@pytest.mark.parametrize(("points", "normals", "true"), SHAPES.values(), ids=SHAPES.keys())
+def test_where_patches_agree_the_foot_is_on_the_surface(points, normals, true, random):
+    x, surface = around(points, random), fit(points, normals)
+    found, spacing = surface.project(x), np.median(local_spacing(points))
+    agreed = found.spread < 0.02 * spacing
+    assert agreed.mean() > 0.5
+    assert not (agreed & found.past_rim).any()
+    assert np.percentile(surface.project((x - found.step)[agreed]).distance, 99) < 0.02 * spacing
+
+
+def test_feet_are_off_by_less_than_their_spread(random):
+    """Where normals scatter, patches do."""
+    points = shapes.sphere(1500)
+    normals = points + 0.1 * random.normal(size=points.shape)
+    surface, x = fit(points, normals / np.linalg.norm(normals, axis=1, keepdims=True)), around(points, random)
+    found = surface.project(x)
+    assert (surface.project(x - found.step).distance <= found.spread).mean() > 0.99
+
+
 def test_samples_lie_on_the_surface():
     points = shapes.torus(2000)
     ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
