@@ -18,7 +18,7 @@ FREE_SHARE = 0.7  # of the free memory, where no limit is set
 _MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 42.0, "node": 46e-6, "sides": 2.5e-3}  # MiB
 
 # The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
-_BAND_MEMORY = {"field": 150.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
+_BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
 # Processor seconds where the probe takes _PROBE of them; fitted to 26 runs over 100 to 100,000 samples, resolutions of

@@ -86,7 +86,7 @@ def test_the_message_names_the_need_the_limit_and_a_resolution_that_fits():
 
 def test_in_a_band_cost_grows_with_the_surface():
     coarse, fine = (cost(POINTS, resolution, band=4)[0] for resolution in (512, 2048))
-    assert 12 < (fine.memory_mb - 150) / (coarse.memory_mb - 150) < 17
+    assert 12 < (fine.memory_mb - 60) / (coarse.memory_mb - 60) < 17
     whole = cost(POINTS, 512)[0]
     assert coarse.memory_mb < whole.memory_mb / 2.5
     assert cost(POINTS, 512, band=4, surface="single")[0].memory_mb > 1.1 * coarse.memory_mb
