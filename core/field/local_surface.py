@@ -12,7 +12,7 @@ from .borders import Rims, find_rims
 from .curvature import bending, tangent_frames
 from .projection import NEAREST, Projection, project
 from .rim_lines import with_rim_lines
-from .sampling_gaps import with_sampling_gaps_bridged
+from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged
 
 NEIGHBOURS = 16  # of a sample, that its patch is fitted to
 _CHUNK = 16384  # samples
@@ -78,8 +78,10 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     frames = tangent_frames(normals)
     neighbours = patch_neighbours(tree, progress.part(0.0, 0.1))
     bend = bending(points, normals, frames, spacing, neighbours, progress.part(0.1, 0.5))
-    rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, progress.part(0.5, 0.85))
-    part = progress.part(0.85, 0.9)
+    rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, progress.part(0.5, 0.84))
+    usual = np.median(spacing[neighbours], axis=1)
+    rims = with_openings_kept(rims, points, normals, spacing, usual, tree, bridge, progress.part(0.84, 0.86))
+    part = progress.part(0.86, 0.9)
     rims = with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, bridge, part)
     rims = with_rim_lines(rims, points, normals, spacing, tree, progress.part(0.9, 1.0))
     return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)

@@ -6,7 +6,7 @@ from core.field import borders, sampling_gaps
 from core.field.borders import find_rims
 from core.field.curvature import bending, tangent_frames
 from core.field.local_surface import fit_local_surface, patch_neighbours
-from core.field.sampling_gaps import with_sampling_gaps_bridged
+from core.field.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged
 from core.points import local_spacing
 from tests import shapes
 
@@ -20,6 +20,15 @@ def before_and_after(points, normals, bend_times=1.0):
     bend = bend_times * bending(points, normals, frames, spacing, neighbours)
     rims = find_rims(points, normals, frames, spacing, neighbours, tree, 3.0)
     return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, 3.0), spacing
+
+
+def with_and_without_openings_kept(points, normals):
+    normals = np.broadcast_to(normals, points.shape)
+    spacing, tree = local_spacing(points), KDTree(points)
+    neighbours = patch_neighbours(tree)
+    usual = np.median(spacing[neighbours], axis=1)
+    rims = find_rims(points, normals, tangent_frames(normals), spacing, neighbours, tree, 3.0)
+    return with_openings_kept(rims, points, normals, spacing, usual, tree, 3.0), rims, spacing
 
 
 def open_rim(rims):
@@ -55,6 +64,26 @@ def test_a_slit_wider_than_the_bridging_length_stays_open(width, random):
     beside = open_rim(before) & (np.abs(points[:, 0]) < side + 0.6 * spacing) & (np.abs(points[:, 1]) < 0.8)
     assert beside.sum() > 10
     assert not after.bridged[beside].any()
+
+
+def test_a_slit_is_not_bridged_from_samples_that_happen_to_be_far_from_their_neighbours(random):
+    points = np.pad(random.uniform(-1, 1, (8000, 2)), ((0, 0), (0, 1)))
+    side = 0.5 * 3.6 * np.median(local_spacing(points))
+    points[:, 0] += np.sign(points[:, 0]) * side
+    kept, rims, spacing = with_and_without_openings_kept(points, UP)
+    beside = np.abs(points[:, 0]) < side + 2 * spacing
+    across = beside & (points[:, 0] * rims.outward[:, 0] < -0.9 * np.abs(points[:, 0]))
+    assert (rims.bridged & across).sum() > 10
+    assert (kept.bridged & across).sum() < 0.2 * (rims.bridged & across).sum()
+    assert not kept.reach[rims.bridged & ~kept.bridged].any()
+    assert (kept.bridged != rims.bridged)[~beside].mean() < 1e-3
+
+
+def test_gaps_in_the_sampling_of_a_closed_surface_stay_bridged():
+    points = shapes.scattered_sphere(20_000)
+    kept, rims, _ = with_and_without_openings_kept(points, points)
+    assert rims.bridged.sum() > 200
+    np.testing.assert_array_equal(kept.bridged, rims.bridged)
 
 
 def test_a_round_hole_twice_as_wide_as_the_bridging_length_stays_open():
