@@ -1,5 +1,6 @@
 """Noise and stray points on clean cases: what each way to a surface makes of them."""
 
+from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
@@ -14,6 +15,7 @@ from .cases import Case
 from .geometry import closest_points
 from .metrics import surface_errors, topology
 from .peers import PEERS, Clock, poisson
+from .processes import Failed, run_fresh
 
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 HALF_NOISE = 0.5
@@ -42,12 +44,11 @@ def strewn(case: Case, share: float, seed: int = 0) -> np.ndarray:
 
 def measure_noise(case: Case, percent: float) -> dict:
     """Distances of the points to the true surface, x1e3, agreement of normals, errors of the surfaces and CPU seconds,
-    by way to get there; see `docs/noise.md`."""
+    by way to get there; see `docs/noise.md`. Peers that crash are left out."""
     points = noisy(case, percent)
-    ways = {"ours": _ours, "alternating": _alternating, "poisson": _poisson, "jet": _jet}
-    if find_spec("CGAL") is None:
-        del ways["jet"]
-    found = {name: way(case, points) for name, way in ways.items()}
+    peers = {"poisson": _poisson} | ({"jet": _jet} if find_spec("CGAL") else {})
+    found = {"ours": _ours(case, points), "alternating": _alternating(case, points)}
+    found |= {name: row for name, way in peers.items() if (row := by_peer(way, case, points))}
     agreement = {k: _agreement(pca_normals(points, k)[0], case.normals) for k in PCA_NEIGHBOURS}
     best = max(agreement, key=agreement.get)
     return {
@@ -59,6 +60,15 @@ def measure_noise(case: Case, percent: float) -> dict:
         "pca": {"nc": agreement[best], "k": best},
         **found,
     }
+
+
+def by_peer(way: Callable[..., dict], *arguments) -> dict:
+    """What a peer's way finds, in a process of its own; {} where its library crashes there."""
+    try:
+        return run_fresh(way, *arguments)
+    except Failed as error:
+        print(f"{way.__name__}: {error}", flush=True)
+        return {}
 
 
 def half_noisy(case: Case, percent: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

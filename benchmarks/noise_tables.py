@@ -27,7 +27,7 @@ def distances(rows):
 def normals(rows):
     yield "case", "noise %", "here", "best PCA", "k", "alternation", "Open3D"
     for row in rows:
-        found = (f"{row[way]['nc']:.4f}" for way in ("ours", "pca", "alternating", "poisson"))
+        found = (f"{row[way]['nc']:.4f}" if way in row else "–" for way in ("ours", "pca", "alternating", "poisson"))
         here, pca, other, open3d = found
         yield row["case"], f"{row['percent']:g}", here, pca, str(row["pca"]["k"]), other, open3d
 
@@ -126,7 +126,8 @@ def wires(rows):
 def uneven(rows):
     yield "shape", "points", "here", f"bridge {noise_uneven.BRIDGE:g}", "Poisson"
     for row in rows:
-        cells = (f"{row[way]['cd']:.3f} ({row[way]['hd']:.0f})" for way in ("ours", "bridged", "poisson"))
+        ways = "ours", "bridged", "poisson"
+        cells = (f"{row[way]['cd']:.3f} ({row[way]['hd']:.0f})" if way in row else "–" for way in ways)
         yield row["shape"], f"{row['points']:,}", *cells
 
 
@@ -140,7 +141,7 @@ def cost_rows(rows):
 
 
 def cost(rows, way):
-    return float(np.median([row[way]["cpu"] / row["ours"]["cpu"] for row in rows]))
+    return float(np.median([row[way]["cpu"] / row["ours"]["cpu"] for row in rows if way in row]))
 
 
 def place(row):

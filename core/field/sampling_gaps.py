@@ -29,8 +29,8 @@ _APART = 0.06  # of the gap, what the patches to both sides may differ by halfwa
 
 
 def with_openings_kept(rims: Rims, points, normals, spacing, usual, tree: KDTree, bridge: float, progress=None) -> Rims:
-    """The rims with gaps that have a long row of samples at their rim bridged only up to `bridge` times the spacing that
-    is usual around them.
+    """The rims with gaps that have a long row of samples at their rim bridged only up to `bridge` times the spacing
+    that is usual around them.
 
     points, normals : (n,3) float64     spacing, usual : (n,) local spacing, and the median of it among the neighbours
     """

@@ -1,6 +1,7 @@
 """The measures behind docs/noise.md on shapes whose truth is known, and the page on made-up numbers."""
 
 import json
+import os
 from dataclasses import replace
 from functools import partial
 
@@ -20,6 +21,7 @@ from benchmarks.noise_measure import (
     MARGIN,
     NOISE,
     STRAYS,
+    by_peer,
     half_noisy,
     measure_strays,
     noisy,
@@ -234,6 +236,20 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
     assert "c …" in page
     assert (tmp_path / "noise" / "noise.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "noise" / "numbers.json").read_text())["fuzz"] == measured["fuzz"]
+
+
+def test_peers_that_crash_are_left_out(tmp_path, capfd):
+    assert by_peer(os._exit, 3) == {}
+    assert "crashed with exit code 3" in capfd.readouterr().out
+    assert by_peer(dict, ((1, 2),)) == {1: 2}
+
+    measured = made_up()
+    for row in measured["noise"][:2] + measured["uneven"]:
+        del row["poisson"]
+    page = write_page(measured, tmp_path).read_text()
+    assert f"| {CASES[0]} | {NOISE[0]:g} | 0.9900 | 0.9800 | 12 | 0.9900 | – |" in page
+    assert "| a torus | 2,000 | 0.500 (9) | 0.500 (9) | – |" in page
+    assert "Poisson 0.50 ×" in page
 
 
 @pytest.mark.parametrize(
