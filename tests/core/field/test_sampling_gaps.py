@@ -26,9 +26,8 @@ def with_and_without_openings_kept(points, normals):
     normals = np.broadcast_to(normals, points.shape)
     spacing, tree = local_spacing(points), KDTree(points)
     neighbours = patch_neighbours(tree)
-    usual = np.median(spacing[neighbours], axis=1)
     rims = find_rims(points, normals, tangent_frames(normals), spacing, neighbours, tree, 3.0)
-    return with_openings_kept(rims, points, normals, spacing, usual, tree, 3.0), rims, spacing
+    return with_openings_kept(rims, points, normals, spacing, neighbours, tree, 3.0), rims, spacing
 
 
 def open_rim(rims):
