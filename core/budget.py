@@ -14,8 +14,10 @@ from .settings import WITH_SIDES, Settings, options
 
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 
-# Measured on runs with default settings over 1,000 to 300,000 samples, resolutions of 64 to 320.
-_MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 42.0, "node": 46e-6, "sides": 2.5e-3}  # MiB
+# Measured on 86 runs over 100 to 200,000 samples, resolutions of 64 to 512: the Voronoi diagram by samples, the field
+# by nodes, the meshes by nodes and by squared cells of the surface. Each is gone before the next is made.
+_MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 45.0, "node": 31e-6, "meshes": 55.0, "held node": 8e-6}  # MiB
+_MESHES = {"none": 0.0, "double": 3.6e-3, "single": 3.6e-3, "both": 6e-3, "signed": 3.6e-3}
 
 # The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
@@ -56,20 +58,19 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
         nodes = float(np.prod(grid.shape))
         near = 2.0 * float(np.sum(cells**2 * (_NEAR + cells)))
         work += _NEAR_NODE * near + _NODE * nodes
-        memory = _MEMORY["field"] + _MEMORY["node"] * nodes + _MEMORY["sides"] * area * sides
     else:
         width, share = _BAND_NEAR
         near = 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells))))
         work += _BAND_NEAR_NODE * near + _BAND_NODE * 2.0 * area * settings.band
-        memory = _BAND_MEMORY["field"] + _BAND_MEMORY["surface with sides" if sides else "surface"] * area
     probe, busy = _probe()
     cpu = work * probe / _PROBE
-    return Estimate(_CORES * busy * cpu, max(memory, _diagram(len(spacing))), cpu)
+    return Estimate(_CORES * busy * cpu, _memory(len(spacing), area, float(np.prod(grid.shape)), settings), cpu)
 
 
-def check_budget(estimate: Estimate, samples: int, grid: Grid, settings: Settings) -> tuple[str, ...]:
-    """A warning where the memory estimated is beyond half of the limit; raises :class:`MemoryBudgetError` where it is
-    beyond the limit, with a message that says what fits."""
+def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: Settings) -> tuple[str, ...]:
+    """A warning where the memory estimated for samples with local spacing (n,), in the units of the grid, is beyond
+    half of the limit; raises :class:`MemoryBudgetError` where it is beyond the limit, with a message that says what
+    fits."""
     limit = settings.memory_limit
     if limit == "auto":
         limit = FREE_SHARE * free_memory_mb()
@@ -78,14 +79,13 @@ def check_budget(estimate: Estimate, samples: int, grid: Grid, settings: Setting
     if estimate.memory_mb <= limit:
         return (f"estimated at {estimate.memory_mb:.0f} MiB, of {limit:.0f} MiB that may be used",)
     least = options()["resolution"].metadata["limits"][0]
-    finer = range(settings.resolution - 1, least - 1, -1)
-    fitting = (r for r in finer if max(_diagram(samples), _at(r, estimate, grid, settings)) <= limit)
-    if resolution := next(fitting, None):
+    area, coarser = float(np.sum((spacing / grid.spacing) ** 2)), range(settings.resolution - 1, least - 1, -1)
+    if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
         band = ", set band to 4" if settings.band is None and settings.integration == "transport" else ""
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
     else:
         fitting = max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))
-        remedy = f"thin the {samples} points to {fitting} or fewer, or raise memory_limit"
+        remedy = f"thin the {len(spacing)} points to {fitting} or fewer, or raise memory_limit"
     raise MemoryBudgetError(
         f"resolution {settings.resolution} needs about {estimate.memory_mb:.0f} MiB; "
         f"{limit:.0f} MiB may be used; {remedy}"
@@ -99,19 +99,22 @@ def free_memory_mb() -> float:
     return (_windows_available if sys.platform == "win32" else _mac_available)()
 
 
-def _diagram(samples):
-    """MiB of the Voronoi diagram, which is gone before the grid is filled: the larger of the two counts."""
-    return _MEMORY["diagram"] + _MEMORY["sample"] * samples
-
-
-def _at(resolution, estimate, grid, settings):
-    """MiB of the field at another resolution."""
-    ratio = resolution / settings.resolution
+def _memory(samples, area, nodes, settings):
+    """MiB of a run over a surface of `area` squared cells: of its most costly stage."""
+    diagram = _MEMORY["diagram"] + _MEMORY["sample"] * samples
     if settings.band is not None:
-        return _BAND_MEMORY["field"] + (estimate.memory_mb - _BAND_MEMORY["field"]) * ratio**2
-    nodes = np.prod(np.ceil((np.array(grid.shape) - 1) * ratio) + 2)
-    rest = max(0.0, estimate.memory_mb - _MEMORY["field"] - _MEMORY["node"] * np.prod(grid.shape))
-    return _MEMORY["field"] + _MEMORY["node"] * nodes + rest * ratio**2 * (settings.surface in WITH_SIDES)
+        kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
+        return max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
+    field = _MEMORY["field"] + _MEMORY["node"] * nodes
+    meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _MESHES[settings.surface] * area
+    return max(diagram, field, meshes)
+
+
+def _memory_at(resolution, samples, area, grid, settings):
+    """The same at another resolution than that of the grid."""
+    ratio = resolution / settings.resolution
+    nodes = float(np.prod(np.ceil((np.array(grid.shape) - 1) * ratio) + 2))
+    return _memory(samples, area * ratio**2, nodes, settings)
 
 
 def _probe():

@@ -74,7 +74,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
         grid = fit_grid(samples.points, settings.resolution)
         estimate = estimate_cost(spacing, grid, settings, noisy="noisy" in cleaning)
-        large = check_budget(estimate, len(spacing), grid, settings)
+        large = check_budget(estimate, spacing, grid, settings)
 
     with stages("normals"):
         if normals is None:

@@ -270,7 +270,7 @@ def test_info_knows_of_the_band(capsys, scan):
     fine = "info", scan, "--resolution", 512, "--json"
     whole, band = (json.loads(run(capsys, *fine, *more)[1]) for more in ([], ["--band", 4]))
     assert (whole["band"], band["band"]) == (None, 4.0)
-    assert band["estimate"]["memory_mb"] < whole["estimate"]["memory_mb"] / 3
+    assert band["estimate"]["memory_mb"] < whole["estimate"]["memory_mb"] / 2
     assert "those within 4 cells of the surface alone" in run(capsys, "info", scan, "--band", 4)[1]
     assert "set band" in refused(capsys, "info", scan, "--resolution", 1024)
 
