@@ -71,6 +71,12 @@ def by_peer(way: Callable[..., dict], *arguments) -> dict:
         return {}
 
 
+def cd_and_hd(mesh: Mesh, truth: Mesh) -> dict:
+    """CD and HD of a mesh, x1e3."""
+    errors = surface_errors(mesh, truth)
+    return {"cd": errors["cd"], "hd": errors["hd"]}
+
+
 def half_noisy(case: Case, percent: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Points (n,3) of the case with the noise of `noisy` in the half with larger x, and which those are, (n,) bool."""
     half = case.points[:, 0] > np.median(case.points[:, 0])
@@ -90,9 +96,9 @@ def measure_half(case: Case, percent: float) -> dict:
         "falsely": moved[~there].mean(),
         "before": _distance(points[half], case.truth),
         "after": _distance(result.points[there], case.truth),
-        "cd": _errors(result.surface, case)["cd"],
-        "cd_none": _errors(none.surface, case)["cd"],
-        "cd_every": _errors(every.surface, case)["cd"],
+        "cd": cd_and_hd(result.surface, case.truth)["cd"],
+        "cd_none": cd_and_hd(none.surface, case.truth)["cd"],
+        "cd_every": cd_and_hd(every.surface, case.truth)["cd"],
     }
 
 
@@ -116,8 +122,8 @@ def measure_strays(case: Case, share: float) -> dict:
         "share": share,
         "found": 1.0 - kept[~own].mean() if share else None,
         "lost": 1.0 - kept[own].mean(),
-        **{name: surface_errors(result.surface, case.truth)[name] for name in ("cd", "hd")},
-        "untreated_cd": surface_errors(untreated.surface, case.truth)["cd"],
+        **cd_and_hd(result.surface, case.truth),
+        "untreated_cd": cd_and_hd(untreated.surface, case.truth)["cd"],
         "pieces": topology(result.surface)["components"],
     }
 
@@ -142,15 +148,15 @@ def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
         "share": share,
         "level": level,
         "moved": moved[noisy_there[result.source_index]].mean(),
-        "cd": _errors(result.surface, case)["cd"],
-        "cd_best": _errors(reconstruct(best, Settings(denoise=0)).surface, case)["cd"],
+        "cd": cd_and_hd(result.surface, case.truth)["cd"],
+        "cd_best": cd_and_hd(reconstruct(best, Settings(denoise=0)).surface, case.truth)["cd"],
     }
 
 
 def measure_between(case: Case, percent: float) -> dict:
     """CD of the surface with noise of a level that others have published figures for."""
     surface = reconstruct(noisy(case, percent)).surface
-    return {"case": case.name, "percent": percent, "cd": _errors(surface, case)["cd"]}
+    return {"case": case.name, "percent": percent, "cd": cd_and_hd(surface, case.truth)["cd"]}
 
 
 def _ours(case, points):
@@ -163,7 +169,7 @@ def _ours(case, points):
         "noise": 1e3 * cleaning.get("noise", 0.0),
         "neighbours": cleaning.get("neighbours"),
         "cpu": clock.cpu,
-        **_errors(result.surface, case),
+        **cd_and_hd(result.surface, case.truth),
     }
 
 
@@ -177,13 +183,13 @@ def _alternating(case, points):
         "nc": _agreement(axes, case.normals),
         "changes": changes,
         "cpu": clock.cpu,
-        **_errors(result.surface, case),
+        **cd_and_hd(result.surface, case.truth),
     }
 
 
 def _poisson(case, points):
     mesh, axes, clock = poisson(points)
-    return {"nc": _agreement(axes, case.normals), "cpu": clock.cpu, **_errors(mesh, case)}
+    return {"nc": _agreement(axes, case.normals), "cpu": clock.cpu, **cd_and_hd(mesh, case.truth)}
 
 
 def _jet(case, points):
@@ -199,12 +205,7 @@ def _jet(case, points):
         jet_smooth_point_set(cloud, JET_NEIGHBOURS)
         moved = np.array([[point.x(), point.y(), point.z()] for point in cloud.points()])
         mesh = PEERS["front"].finish(moved, None)
-    return {"after": _distance(moved, case.truth), "cpu": clock.cpu, **_errors(mesh, case)}
-
-
-def _errors(mesh: Mesh, case: Case) -> dict:
-    errors = surface_errors(mesh, case.truth)
-    return {"cd": errors["cd"], "hd": errors["hd"]}
+    return {"after": _distance(moved, case.truth), "cpu": clock.cpu, **cd_and_hd(mesh, case.truth)}
 
 
 def _distance(points, truth):

@@ -36,8 +36,7 @@ def surfaces(rows):
     ways = {"ours": "here", "alternating": "alternation", "jet": "jet, front", "poisson": "Poisson"}
     yield "case", "noise %", *ways.values()
     for row in rows:
-        cells = (f"{row[way]['cd']:.3f} ({row[way]['hd']:.0f})" if way in row else "–" for way in ways)
-        yield row["case"], f"{row['percent']:g}", *cells
+        yield row["case"], f"{row['percent']:g}", *_cd_and_hd(row, ways)
 
 
 def halves(rows):
@@ -126,9 +125,11 @@ def wires(rows):
 def uneven(rows):
     yield "shape", "points", "here", f"bridge {noise_uneven.BRIDGE:g}", "Poisson"
     for row in rows:
-        ways = "ours", "bridged", "poisson"
-        cells = (f"{row[way]['cd']:.3f} ({row[way]['hd']:.0f})" if way in row else "–" for way in ways)
-        yield row["shape"], f"{row['points']:,}", *cells
+        yield row["shape"], f"{row['points']:,}", *_cd_and_hd(row, ("ours", "bridged", "poisson"))
+
+
+def _cd_and_hd(row, ways):
+    return (f"{row[way]['cd']:.3f} ({row[way]['hd']:.0f})" if way in row else "–" for way in ways)
 
 
 def cost_rows(rows):

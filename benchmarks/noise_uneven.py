@@ -8,8 +8,7 @@ import numpy as np
 from core import Mesh, Settings, reconstruct
 
 from .geometry import surface_samples
-from .metrics import surface_errors
-from .noise_measure import by_peer
+from .noise_measure import by_peer, cd_and_hd
 from .peers import poisson
 from .pictures import View, caption, draw_points, draw_surface, save, sheet
 from .sampling import graded, pierced, uniform, wires
@@ -49,8 +48,8 @@ def measure(name: str) -> dict:
     row = {
         "shape": name,
         "points": len(points),
-        "ours": _errors(reconstruct(points).surface, truth),
-        "bridged": _errors(reconstruct(points, Settings(bridge=BRIDGE)).surface, truth),
+        "ours": cd_and_hd(reconstruct(points).surface, truth),
+        "bridged": cd_and_hd(reconstruct(points, Settings(bridge=BRIDGE)).surface, truth),
     }
     found = by_peer(_poisson, points, truth)
     return row | ({"poisson": found} if found else {})
@@ -69,12 +68,7 @@ def picture(path: Path) -> Path:
 
 
 def _poisson(points, truth):
-    return _errors(poisson(points)[0], truth)
-
-
-def _errors(mesh, truth):
-    errors = surface_errors(mesh, truth)
-    return {key: errors[key] for key in ("cd", "hd")}
+    return cd_and_hd(poisson(points)[0], truth)
 
 
 def _points_and_truth(name) -> tuple[np.ndarray, Mesh]:

@@ -39,7 +39,7 @@ def with_openings_kept(
     row = np.flatnonzero(rims.bridged)
     usual = np.median(spacing[neighbours[row]], axis=1)
     row = row[rims.reach[row] > bridged_reach(bridge * usual, spacing[row])]
-    _, other = _looked_across(rims, row, points, normals, spacing, tree, bridge, Progress.of(progress))
+    _, other = _looked_across(rims, row, points, normals, spacing, tree, bridge, progress)
     chain = chain_lengths(rims, rims.gap)
     row = row[np.maximum(chain[row], chain[other]) >= _MANY]
     bridged, reach = rims.bridged.copy(), rims.reach.copy()
@@ -59,7 +59,7 @@ def with_sampling_gaps_bridged(
     rim = rims.gap & ~rims.bridged
     round_ = ~rims.gap & (rims.opening < np.cos(_ROUND / 2)) & _far_from(rim & ~few, points, spacing)
     row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(points)))
-    distance, other = _looked_across(rims, row, points, normals, spacing, tree, widest, Progress.of(progress))
+    distance, other = _looked_across(rims, row, points, normals, spacing, tree, widest, progress)
     across = np.isfinite(distance) & few[other]
     row, other, distance = row[across], other[across], distance[across]
     met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance
@@ -78,7 +78,8 @@ def _looked_across(rims, row, points, normals, spacing, tree, widest, progress):
     def look(part):
         return across_gaps(row[part], rims.outward[row[part]], spacing[row[part]], points, normals, tree, widest)
 
-    for part, found in in_order(look, progress.chunks(len(row), rows_at_a_time(widest, len(points)))):
+    chunks = Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points)))
+    for part, found in in_order(look, chunks):
         distance[part], other[part] = found
     return distance, other
 

@@ -13,20 +13,23 @@ from tests import shapes
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def before_and_after(points, normals, bend_times=1.0):
-    normals = np.broadcast_to(normals, points.shape)
-    spacing, tree = local_spacing(points), KDTree(points)
-    frames, neighbours = tangent_frames(normals), patch_neighbours(tree)
-    bend = bend_times * bending(points, normals, frames, spacing, neighbours)
-    rims = find_rims(points, normals, frames, spacing, neighbours, tree, 3.0)
-    return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, 3.0), spacing
-
-
-def with_and_without_openings_kept(points, normals):
+def rims_of(points, normals):
+    """What looks at rims is given: rims, normals, local spacing, neighbours and the tree."""
     normals = np.broadcast_to(normals, points.shape)
     spacing, tree = local_spacing(points), KDTree(points)
     neighbours = patch_neighbours(tree)
     rims = find_rims(points, normals, tangent_frames(normals), spacing, neighbours, tree, 3.0)
+    return rims, normals, spacing, neighbours, tree
+
+
+def before_and_after(points, normals, bend_times=1.0):
+    rims, normals, spacing, neighbours, tree = rims_of(points, normals)
+    bend = bend_times * bending(points, normals, tangent_frames(normals), spacing, neighbours)
+    return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, 3.0), spacing
+
+
+def with_and_without_openings_kept(points, normals):
+    rims, normals, spacing, neighbours, tree = rims_of(points, normals)
     return with_openings_kept(rims, points, normals, spacing, neighbours, tree, 3.0), rims, spacing
 
 
