@@ -11,7 +11,7 @@ import numpy as np
 from core import Mesh
 from core.io.atomic import atomic_path
 
-from .sampling import blue_noise, graded, pierced, uniform, wires
+from .sampling import blue_noise, contours, graded, pierced, uniform, wires
 from .shapes import bordered, closed, junctions, one_sided, rooms
 from .shapes.surface import Surface, from_mesh
 
@@ -81,6 +81,8 @@ CASES = {
     "knot_graded_10k": Recipe("varying density", closed.knot, 10_000, graded),
     "cloth_graded_10k": Recipe("varying density", bordered.cloth, 10_000, graded),
     "torus_wires_3k": Recipe("wireframe", closed.torus, 3_000, wires),
+    "bumps_contours_4k": Recipe("wireframe", closed.bumps, 4_000, contours),
+    "relief_contours_8k": Recipe("wireframe", bordered.relief, 8_000, contours),
     "bumps_holes_10k": Recipe("holes", closed.bumps, 10_000, pierced),
     "bumps_noise0.5_10k": Recipe("noisy", closed.bumps, 10_000, noise=0.5, quick=True),
     "cloth_noise0.5_10k": Recipe("noisy", bordered.cloth, 10_000, noise=0.5),

@@ -17,7 +17,7 @@ from .catalogue import sampled
 from .metrics import surface_errors
 from .peers import PEERS, check_open3d
 from .pictures import View, caption, draw_distances, draw_errors, draw_points, draw_surface, error_scale, save, sheet
-from .sampling import blue_noise, pierced, uniform, wires
+from .sampling import blue_noise, pierced, uniform
 from .shapes import bordered, closed, junctions, one_sided
 from .status import DONE, exit_status
 from .steps import cuts, pipeline, rounds
@@ -76,19 +76,23 @@ def normals(path: Path) -> Path:
 
 
 def gaps(path: Path) -> Path:
-    """Holes and wires: what the default bridges, and what a larger `bridge` does."""
+    """Holes, which the default leaves open and a larger `bridge` closes; wires and contours, which it joins."""
     holed, _ = pierced(closed.bumps(), 10_000, np.random.default_rng(0))
-    caged, _ = wires(closed.torus(), 3_000, np.random.default_rng(0))
-    figure, panels = sheet(2, 4)
-    tried = [("holes six spacings wide", holed, View(), (3.0, 8.0, 14.0))]
-    tried.append(("wires", caged, View((-0.4, -1.0, 1.1)), (3.0, 10.0, 20.0)))
-    for row, (title, points, view, bridges) in zip(panels, tried, strict=True):
+    figure, (above, below) = sheet(2, 4)
+    camera = View().camera(holed, _PIXELS)
+    draw_points(above[0], holed, camera)
+    caption(above[0], "holes six spacings wide", f"{len(holed):,} points")
+    for panel, bridge in zip(above[1:], (Settings().bridge, 8.0, 14.0), strict=True):
+        draw_surface(panel, reconstruct(holed, Settings(bridge=bridge)).surface, camera, View())
+        caption(panel, f"bridge {bridge:g}{', the default' if bridge == Settings().bridge else ''}")
+    lines = ("wires", "torus_wires_3k", View((-0.4, -1.0, 1.1))), ("contours", "relief_contours_8k", View())
+    for (left, right), (title, name, view) in zip(below.reshape(2, 2), lines, strict=True):
+        points = sampled(name)[1]
         camera = view.camera(points, _PIXELS)
-        draw_points(row[0], points, camera)
-        caption(row[0], title, f"{len(points):,} points")
-        for panel, bridge in zip(row[1:], bridges, strict=True):
-            draw_surface(panel, reconstruct(points, Settings(bridge=bridge)).surface, camera, view)
-            caption(panel, f"bridge {bridge:g}{', the default' if bridge == Settings().bridge else ''}")
+        draw_points(left, points, camera)
+        caption(left, title, f"{len(points):,} points")
+        draw_surface(right, reconstruct(points).surface, camera, view)
+        caption(right, "the default")
     return save(figure, path)
 
 
@@ -120,14 +124,15 @@ def _two_sheets(rng):
 def lost(path: Path) -> Path:
     """A case on which a peer has less error: our surface and that peer's, coloured by the distance to the truth."""
     check_open3d()
-    surface, points, *_ = sampled("torus_wires_3k")
-    peer, worst, camera = PEERS["poisson"], 4, View((-0.4, -1.0, 1.1)).camera(points, _PIXELS)
-    meshes = {"VAD": reconstruct(points).surface, peer.title: peer.finish(peer.prepare(points), None)}
+    surface = closed.bumps()
+    points, _ = blue_noise(surface, 100_000, np.random.default_rng(0))
+    peer, worst, camera = PEERS["pivoting"], 0.1, View().camera(points, _PIXELS)
+    meshes = {"VAD": reconstruct(points).surface, peer.title: peer.finish(peer.prepare(points), peer.variants[0])}
     figure, (panels,) = sheet(1, len(meshes))
     for panel, (way, mesh) in zip(panels, meshes.items(), strict=True):
         draw_distances(panel, mesh, surface.mesh, worst * 1e-3, camera)
         off = surface_errors(mesh, surface.mesh)
-        caption(panel, f"torus_wires_3k: {way}", f"CD {off['cd']:.3f}, HD {off['hd']:.1f}, scale to {worst}")
+        caption(panel, f"{len(points):,} points: {way}", f"CD {off['cd']:.3f}, HD {off['hd']:.1f}, scale to {worst}")
     return save(figure, path)
 
 

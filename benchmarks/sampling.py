@@ -48,13 +48,18 @@ def pierced(surface: Surface, count: int, rng: np.random.Generator, holes: int =
     return points[kept], normals[kept]
 
 
-def wires(surface: Surface, count: int, rng: np.random.Generator, planes: int = 9, thickness: float = 0.004):
-    """Only points near evenly spaced planes across x, y and z: a cage of contour lines."""
+def wires(surface: Surface, count: int, rng: np.random.Generator, planes: int = 9, thickness: float = 0.004, axes=3):
+    """Only points near evenly spaced planes across the first `axes` of x, y and z: a cage of contour lines."""
     points, normals = sample(surface, 40 * count, rng)
     places = (np.arange(planes) + 0.5) / planes * 0.8 - 0.4
-    near = np.flatnonzero((np.abs(points[:, :, None] - places) < thickness / 2).any(axis=(1, 2)))
+    near = np.flatnonzero((np.abs(points[:, :axes, None] - places) < thickness / 2).any(axis=(1, 2)))
     kept = near[:count]
     return points[kept], normals[kept]
+
+
+def contours(surface: Surface, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Only points on 32 evenly spaced slices across x, as of a scanner that moves along it."""
+    return wires(surface, count, rng, planes=32, thickness=0.001, axes=1)
 
 
 def _apart(points, radius):

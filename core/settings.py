@@ -45,7 +45,8 @@ class Settings:
     bridge: float = _option(
         3.0,
         "Gaps up to this wide are closed and wider ones stay open, in units of the local distance between points; "
-        "those that chance leaves among random points are closed up to half as wide again. "
+        "those that chance leaves among random points are closed up to half as wide again, those between lines of "
+        "points (wires, contours, lines of a scanner) up to five times as wide. "
         "Raise it where the surface has pinholes, lower it where openings grow shut",
         limits=(1.5, 20.0),
         unit="local spacings",

@@ -9,6 +9,7 @@ other, and that line is where the patch ends, unless the sheet goes on straight 
 """
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -21,6 +22,7 @@ from ..progress import Progress
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
+_OPPOSITE = np.cos(GAP / 2)  # least cosine, to the direction opposite to a gap, of what lies there
 _BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
 
 _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
@@ -44,6 +46,7 @@ class Rims:
     beside    : (n,2) int64, the two neighbours that bound it     ends : (n,2,3) float64, steps to them
     margin    : (n,3) float64, how far the sheet goes on past the sample and past those two neighbours, at rims
     reach     : (n,) float64, how far the patch covers a bridged gap
+    behind    : (n,) float64, how far it covers a gap opposite to that one, at lines of samples; 0 elsewhere
     crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ
     limit     : (n,2) float64, distance to them, inf where there is none
     """
@@ -56,8 +59,14 @@ class Rims:
     ends: np.ndarray
     margin: np.ndarray
     reach: np.ndarray
+    behind: np.ndarray
     crease: np.ndarray
     limit: np.ndarray
+
+    @cached_property
+    def farthest(self) -> np.ndarray:
+        """(n,) how far the patch covers gaps to either side."""
+        return np.maximum(self.reach, self.behind)
 
 
 def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:
@@ -114,7 +123,7 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     ends = np.einsum("nea,nai->nei", ends, frames)
     beside = np.take_along_axis(neighbours, bounding, axis=1)
     margin = np.repeat(RIM * spacing[:, None], 3, axis=1)
-    return Rims(gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, crease, limit)
+    return Rims(gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, np.zeros(n), crease, limit)
 
 
 def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray]:
@@ -130,6 +139,8 @@ def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray
     along = np.einsum("ig,gi->g", lateral[:, *gap], rims.outward[owner])
     open_side = along > length[gap] * rims.opening[owner]
     radius[gap] = np.where(open_side & rims.bridged[owner], rims.reach[owner], radius[gap])
+    opposite = along < -_OPPOSITE * length[gap]
+    radius[gap] = np.where(opposite, np.maximum(radius[gap], rims.behind[owner]), radius[gap])
     beyond = np.maximum(length - radius, 0)
     step = lateral * (beyond / np.maximum(length, np.finfo(length.dtype).tiny))
 
@@ -158,12 +169,12 @@ def one_sheet(step, normals, other_normals) -> np.ndarray:
     return _level(step, normals, other_normals) & _aligned(normals, other_normals, _FLAT)
 
 
-def _level(step, normals, other_normals):
-    """Whether both ends of steps (...,3) lie close to each other's tangent plane."""
+def _level(step, normals, other_normals, most=_STEP):
+    """Whether both ends of steps (...,3) are off each other's tangent plane by less than `most` times their length."""
     height = np.maximum(
         np.abs(np.einsum("...i,...i->...", step, normals)), np.abs(np.einsum("...i,...i->...", step, other_normals))
     )
-    return height < _STEP * np.linalg.norm(step, axis=-1)
+    return height < most * np.linalg.norm(step, axis=-1)
 
 
 def _aligned(normals, other_normals, least):
@@ -214,14 +225,18 @@ def _within(bridge, n):
     return min(n, int(4 * bridge**2) + 8)
 
 
-def across_gaps(rows, outward, spacing, points, normals, tree: KDTree, bridge: float):
-    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings away:
-    its distance (m,), inf where there is none, and its number (m,)."""
-    distance, other = tree.query(points[rows], k=_within(bridge, len(points)))
+def across_gaps(
+    rows, outward, spacing, points, normals, tree: KDTree, bridge: float, step_up=_STEP, most: int | None = None
+):
+    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings away
+    and off the tangent plane by less than the share `step_up` of that: its distance (m,), inf where there is none, and
+    its number (m,). Looks at the `most` nearest samples where given."""
+    distance, other = tree.query(points[rows], k=min(_within(bridge, len(points)), most or len(points)))
     step = points[other] - points[rows, None]
     ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
     near = (distance > 0) & (distance < bridge * spacing[:, None])
-    sheet = _aligned(normals[rows, None], normals[other], 0.5) & _level(step, normals[rows, None], normals[other])
+    sheet = _aligned(normals[rows, None], normals[other], 0.5)
+    sheet &= _level(step, normals[rows, None], normals[other], step_up)
     distance = np.where(ahead & near & sheet, distance, np.inf)
     nearest = np.arange(len(rows)), distance.argmin(axis=1)
     return distance[nearest], other[nearest]

@@ -171,7 +171,7 @@ def _onto_sheet(surface, near, anchor):
     found = np.linalg.norm(step, axis=1)
 
     own, away = near.sample[every, anchor], near.distance[every, anchor]
-    slack = np.maximum(UNCOVERED * surface.spacing[own], 1.1 * surface.rims.reach[own])
+    slack = np.maximum(UNCOVERED * surface.spacing[own], 1.1 * surface.rims.farthest[own])
     bounded = np.clip(found, away - slack, away)
     lifted = bounded > found
     step[lifted] = near.offset[:, every, anchor].T[lifted]

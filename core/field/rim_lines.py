@@ -64,7 +64,7 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     over = (lines.at(along) - up) / np.sqrt(1 + lines.slope**2)[:, None]
     margin[row, 1:] = np.minimum(size[:, None] * _margin(over), known[rims.beside[row]])
 
-    ended = distance < np.maximum(spacing, rims.reach)[other]
+    ended = distance < np.maximum(spacing, rims.farthest)[other]
     crease, limit = rims.crease.copy(), rims.limit.copy()
     slot = np.isfinite(limit[other, 0]).astype(int)
     ended &= ~np.isfinite(limit[other, slot])
