@@ -12,11 +12,22 @@ from ..progress import Progress
 
 COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
 _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
-_ROUNDS = 2
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
 _CHUNK = 30_000  # neighbours
+
+# Where the moments 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy stand in the normal equations.
+_MOMENTS = np.array(
+    [
+        [0, 1, 2, 3, 4, 5],
+        [1, 3, 4, 6, 7, 8],
+        [2, 4, 5, 7, 8, 9],
+        [3, 6, 7, 10, 11, 12],
+        [4, 7, 8, 11, 12, 13],
+        [5, 8, 9, 12, 13, 14],
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -26,11 +37,13 @@ class Quadrics:
     step     : (m,3) float64, from the sample onto the quadric
     height   : (m,) float64, length of that step
     leverage : (m,) float64 in [0,1), share of its own position in the quadric's height at the sample
+    radius   : (m,) float64, distance to the farthest of the neighbours
     """
 
     step: np.ndarray
     height: np.ndarray
     leverage: np.ndarray
+    radius: np.ndarray
 
     def left_out(self) -> np.ndarray:
         """(m,) float64: distance to the quadric that the sample itself had no part in."""
@@ -42,46 +55,58 @@ def fit_quadrics(points, rows, neighbours: int, progress=None) -> Quadrics:
 
     points : (n,3) float64     rows : (m,) int
 
-    The plane is the weighted principal plane; weights fall with the squared distance and, in a second round, with the
-    residual (Cauchy), so that a few strays do not bend the fit.
+    The plane is the weighted principal plane; weights of the quadric fall with the squared distance and, in a second
+    round, with the residual (Cauchy), so that a few strays do not bend the fit.
     """
-    tree, columns = KDTree(points), points.T.copy()
-    found = Quadrics(np.empty((len(rows), 3)), np.empty(len(rows)), np.empty(len(rows)))
+    return nested_quadrics(points, rows, (neighbours,), progress)[0]
+
+
+def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
+    """The same through each of several numbers of neighbours, `sizes`, in rising order."""
+    tree, columns, most = KDTree(points), points.T.copy(), int(sizes[-1])
+    found = [Quadrics(np.empty((len(rows), 3)), *np.empty((3, len(rows)))) for _ in sizes]
 
     def fit(part):
-        distance, index = tree.query(points[rows[part]], k=neighbours)
-        return _fit([x.take(index) - x.take(rows[part])[:, None] for x in columns], distance)
+        distance, index = tree.query(points[rows[part]], k=most)
+        offset = [x.take(index) - x.take(rows[part])[:, None] for x in columns]
+        return [_fit(*(part[:, :k].copy() for part in (*offset, distance))) for k in sizes]
 
-    chunks = Progress.of(progress).chunks(len(rows), max(1, _CHUNK // neighbours))
-    for part, piece in in_order(fit, chunks):
-        found.step[part], found.height[part], found.leverage[part] = piece
+    for part, pieces in in_order(fit, Progress.of(progress).chunks(len(rows), max(1, _CHUNK // most))):
+        for quadrics, piece in zip(found, pieces, strict=True):
+            quadrics.step[part], quadrics.height[part], quadrics.leverage[part], quadrics.radius[part] = piece
     return found
 
 
-def _fit(offset, distance):
-    """Step, height and leverage of quadrics through neighbours with offsets, three (m,k), from the sample."""
-    radius = distance[:, -1:]
+def _fit(east, north, up, distance):
+    """Step, height, leverage and radius of quadrics through neighbours with offsets, three (m,k), from the sample."""
+    offset, radius = (east, north, up), distance[:, -1:]
     weight = np.exp(-_DECAY * (distance / radius) ** 2)
-    for _ in range(_ROUNDS):
-        full = 1.0 / np.einsum("mk->m", weight)  # the share of a sample that lies on its quadric
-        share = weight * full[:, None]
-        normal = _least_spread(offset, share)
-        frame = tangent_frames(normal)
-        axes = frame[:, 0] / radius, frame[:, 1] / radius, normal
-        x, y, height = (sum(part * axis[:, a, None] for a, part in enumerate(offset)) for axis in axes)
-        basis = np.ones_like(x), x, y, x * x, x * y, y * y
-        matrix, right = _normal_equations(basis, share, height)
-        coefficients = solve_positive(matrix, right)
-        residual = height - sum(coefficients[:, a, None] * term for a, term in enumerate(basis))
-        scale = _CAUCHY * 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
-        weight = weight / (1.0 + (residual / np.maximum(scale, _EXACT * radius)) ** 2)
+    normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
+    frame = tangent_frames(normal)
+    x, y, height = (_along(offset, axis) for axis in (frame[:, 0] / radius, frame[:, 1] / radius, normal))
+    basis = x, y, x * x, x * y, y * y
+    coefficients, *_ = _weighted_fit(basis, weight, height)
+    residual = height - coefficients[:, :1]
+    for a, term in enumerate(basis, start=1):
+        residual -= coefficients[:, a, None] * term
+    scale = _CAUCHY * 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
+    weight = weight / (1.0 + (residual / np.maximum(scale, _EXACT * radius)) ** 2)
+    coefficients, matrix, full = _weighted_fit(basis, weight, height)
 
     slope = coefficients[:, 1:3] / radius
     upright = normal - np.einsum("ma,mai->mi", slope, frame)
     squared = np.einsum("mi,mi->m", upright, upright)
     step = (coefficients[:, 0] / squared)[:, None] * upright
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
-    return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95)
+    return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95), radius[:, 0]
+
+
+def _along(offset, axis):
+    """Components (m,k) of offsets, three (m,k), along axes (m,3)."""
+    found = offset[0] * axis[:, 0, None]
+    found += offset[1] * axis[:, 1, None]
+    found += offset[2] * axis[:, 2, None]
+    return found
 
 
 def _least_spread(offset, share):
@@ -92,13 +117,20 @@ def _least_spread(offset, share):
     return principal_axes(-np.stack(spread, axis=1))[0]
 
 
-def _normal_equations(basis, share, height):
-    """Matrices (m,c,c) and right sides (m,c) of weighted fits of c terms (m,k) to heights (m,k)."""
-    m, c = len(height), len(basis)
-    matrix, right = np.empty((m, c, c)), np.empty((m, c))
-    for a, term in enumerate(basis):
-        weighted = share * term
-        right[:, a] = np.einsum("mk,mk->m", weighted, height)
-        for b in range(a, c):
-            matrix[:, a, b] = matrix[:, b, a] = np.einsum("mk,mk->m", weighted, basis[b])
-    return matrix + _STIFFNESS * np.eye(c), right
+def _weighted_fit(basis, weight, height):
+    """Coefficients (m,6) of the terms 1 and `basis`, five (m,k), that fit heights (m,k) best; the matrices (m,6,6) of
+    the normal equations, and (m,) what a sample at the origin counts in them."""
+    x, y, xx, xy, yy = basis
+    full = 1.0 / np.einsum("mk->m", weight)
+    share = weight * full[:, None]
+    weighted = [share, *(share * term for term in basis)]
+    by_xx, by_xy, by_yy = weighted[3:]
+    moments = [np.einsum("mk->m", term) for term in weighted]
+    moments += [_total(by_xx, x), _total(by_xx, y), _total(by_yy, x), _total(by_yy, y)]
+    moments += [_total(by_xx, xx), _total(by_xx, xy), _total(by_xx, yy), _total(by_xy, yy), _total(by_yy, yy)]
+    matrix = np.stack(moments, axis=1)[:, _MOMENTS] + _STIFFNESS * np.eye(COEFFICIENTS)
+    return solve_positive(matrix, np.stack([_total(each, height) for each in weighted], axis=1)), matrix, full
+
+
+def _total(a, b):
+    return np.einsum("mk,mk->m", a, b)

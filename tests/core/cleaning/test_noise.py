@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.cleaning.noise import LADDER, estimate_noise, noisy_samples
+from core.cleaning.noise import LADDER, estimate_noise, looks_noisy, noisy_samples
 from core.points import local_spacing
 from tests import shapes
 
@@ -45,6 +45,15 @@ def test_noise_of_one_half_is_found_there(shape, share):
     assert not found[shape[:, 0] < -0.6].any()
     level = estimate_noise(points, noisy=found).level
     assert np.median(level[found]) == pytest.approx(deviation, rel=0.25)
+
+
+def test_noise_of_a_large_cloud_is_told_from_close_sheets_in_a_few_places():
+    sheets = shapes.sheets(8000, gap=0.04)
+    assert looks_noisy(sheets, local_spacing(sheets))
+    assert not noisy_samples(sheets, local_spacing(sheets)).any()
+    points = shapes.torus(8000)
+    points = noisy(points, 0.15 * np.median(local_spacing(points)))
+    assert noisy_samples(points, local_spacing(points)).all()
 
 
 def test_what_is_rough_in_a_small_place_may_be_detail():

@@ -1,6 +1,6 @@
 import numpy as np
 
-from core.cleaning.quadrics import fit_quadrics
+from core.cleaning.quadrics import fit_quadrics, nested_quadrics
 from tests import shapes
 
 
@@ -38,3 +38,23 @@ def test_leverage_is_the_share_of_itself():
     points = shapes.square(900)
     leverage = fit_quadrics(points, np.arange(len(points)), 60).leverage
     assert ((leverage > 1 / 60) & (leverage <= 0.95)).all()
+
+
+def test_a_quadric_through_its_own_points_is_found_exactly():
+    x, y = np.mgrid[-5:6, -5:6].reshape(2, -1) / 5
+    turn = shapes.random_rotation(1)
+    points = np.column_stack([x, y, 0.3 * x * x + 0.2 * x * y - 0.25 * y * y]) @ turn.T
+    fit = fit_quadrics(points, np.array([60]), 121)  # the middle one, where the tangent plane is that of the axes
+    assert fit.height[0] < 1e-6 < 1e-3 < np.abs(points @ turn[:, 2]).max()
+    slid = points + 0.1 * turn[:, 2] * (np.arange(121) == 60)[:, None]
+    np.testing.assert_allclose(fit_quadrics(slid, np.array([60]), 121).step[0], -0.1 * turn[:, 2], atol=0.01)
+
+
+def test_neighbourhoods_within_one_another_are_fitted_as_each_by_itself():
+    points, rows, sizes = shapes.scattered_sphere(800), np.arange(0, 800, 3), (12, 20, 90)
+    for size, fit in zip(sizes, nested_quadrics(points, rows, sizes), strict=True):
+        alone = fit_quadrics(points, rows, size)
+        np.testing.assert_array_equal(fit.step, alone.step)
+        np.testing.assert_array_equal(fit.leverage, alone.leverage)
+        farthest = np.sort(np.linalg.norm(points[rows, None] - points, axis=2), axis=1)[:, size - 1]
+        np.testing.assert_allclose(fit.radius, farthest, rtol=1e-12)
