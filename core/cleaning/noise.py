@@ -23,7 +23,7 @@ _USABLE = 6.0  # and averages it, rather than following it, once its radius is t
 _GAUSS = 1.4826  # standard deviations in a median absolute error
 _STRAY = 4.5  # errors count as at most this many median ones
 _FREEDOM = 2.0  # a robust fit follows its samples more than its leverage says
-_CHUNK, _SAMPLES = 1000, 32768  # anchors, samples
+_SAMPLES = 32768  # at a time
 _UNEVEN = 2.0  # a region's noise counts as at most this many times the median: two close sheets look like noise
 
 _PATCHES, _PATCH = 16, 300  # patches of a large cloud in which normals are asked, samples in each
