@@ -25,7 +25,7 @@ _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected i
 
 # Processor seconds where the probe takes _PROBE of them; fitted to 26 runs over 100 to 100,000 samples, resolutions of
 # 64 to 256, and seven in a band, up to 768: estimates are about .6 to 1.2 of what was taken.
-_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 8.5e-5
+_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
 _NEAR_NODE, _NODE = 2.1e-6, 5e-8
 _BAND_NEAR_NODE, _BAND_NODE = 4.3e-6, 1.5e-6
 _COVER, _SIDES = 2.1e-5, 4e-5  # for a squared cell of the surface: its double cover, and one with its sides told

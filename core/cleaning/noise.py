@@ -14,10 +14,9 @@ from .quadrics import nested_quadrics
 LADDER = (12, 20, 32, 50, 80, 128, 200)  # neighbours tried
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
 
-_JUDGED = 2500, 70  # samples at which noise is looked for, and how many of these errors are averaged over
-_SPREAD = 18  # of these, that noise spreads to
-_FITTED = 1600, 45  # samples at which the noise is measured, and how many of these errors are averaged over
-_SMOOTHED = 12  # of these, that the chosen neighbourhoods are averaged over
+_ANCHORS = 2500  # samples at which the fits are compared
+_REGION = 70  # anchors over which errors are averaged; over 45 of 1600 the sizes chosen leave steps in surfaces
+_SMOOTHING = 18  # anchors over which the chosen neighbourhoods are averaged
 _SEEN = 10.0  # a fit shows the noise in full once its radius is this many times its left-out error
 _USABLE = 6.0  # and averages it, rather than following it, once its radius is this many times the noise
 _GAUSS = 1.4826  # standard deviations in a median absolute error
@@ -71,7 +70,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         return clean
     progress = Progress.of(progress)
     whole, suspect, relative, anchors, region = _roughness(points, spacing, seed, progress)
-    least = max(_JUDGED[1], _SMALLEST_PART * len(anchors))
+    least = max(_REGION, _SMALLEST_PART * len(anchors))
     if not whole and suspect.sum() < least:
         return clean
 
@@ -84,7 +83,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     if core.sum() < least:
         return clean
     suspect &= core[region].any(axis=1)
-    noisy = suspect[region[:, :_SPREAD]].any(axis=1)  # noise left beside them would stand out as a seam
+    noisy = suspect[region[:, :_SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
     return noisy[_nearest(points, points[anchors], progress.part(0.9, 1.0))]
 
 
@@ -109,7 +108,7 @@ def _agreement(points, spacing, progress):
 def _roughness(points, spacing, seed, progress):
     """Whether samples look noisy as a whole, which anchors look so (m,), how far these are off, local spacings (m,);
     the anchors (m,) and their regions (m,k)."""
-    anchors, region = _anchors(points, seed, *_JUDGED)
+    anchors, region = _anchors(points, seed)
     fits = nested_quadrics(points, anchors, LADDER[:2], progress.part(0.0, 0.1))
     fine, wide = (_GAUSS * np.median(fit.left_out()[region], axis=1) for fit in fits)
     relative = wide / np.median(spacing[anchors][region], axis=1)
@@ -137,7 +136,7 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     takes the neighbourhood of least risk.
     """
     progress = Progress.of(progress)
-    anchors, region = _anchors(points, seed, *_FITTED)
+    anchors, region = _anchors(points, seed)
     ladder = np.array([k for k in LADDER if k < len(points)])
     fits = nested_quadrics(points, anchors, ladder, progress.part(0.0, 0.9))
     missed = np.array([np.sqrt(_regional_square(fit.left_out(), region)) for fit in fits])
@@ -151,17 +150,17 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     level = np.minimum(level, _UNEVEN * np.median(level if noisy is None else level[noisy[anchors]]))
     risk = squared + 2 * _FREEDOM * level**2 * leverage
     risk[np.arange(len(ladder))[:, None] < _first(radius >= _USABLE * level)] = np.inf
-    neighbours = np.exp(np.log(ladder)[risk.argmin(axis=0)][region[:, :_SMOOTHED]].mean(axis=1))
+    neighbours = np.exp(np.log(ladder)[risk.argmin(axis=0)][region[:, :_SMOOTHING]].mean(axis=1))
 
     nearest = _nearest(points, points[anchors], progress.part(0.9, 1.0))
     return Noise(level[nearest], neighbours[nearest])
 
 
-def _anchors(points, seed, most, around):
-    """Up to `most` samples spread over the cloud (m,), and for each the anchors nearest to it, itself first (m,k)."""
-    count = min(len(points), most)
+def _anchors(points, seed):
+    """Samples spread over the cloud (m,), and for each the anchors nearest to it, itself first (m,k)."""
+    count = min(len(points), _ANCHORS)
     anchors = np.sort(np.random.default_rng(seed).choice(len(points), count, replace=False))
-    return anchors, KDTree(points[anchors]).query(points[anchors], k=min(around, count), workers=-1)[1]
+    return anchors, KDTree(points[anchors]).query(points[anchors], k=min(_REGION, count), workers=-1)[1]
 
 
 def _nearest(points, anchors, progress):
