@@ -24,7 +24,7 @@ _BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3} 
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
 # Processor seconds where the probe takes _PROBE of them; fitted to 26 runs over 100 to 100,000 samples, resolutions of
-# 64 to 256, and seven in a band, up to 768: estimates are about .6 to 1.2 of what was taken.
+# 64 to 256, and seven in a band, up to 768: estimates are about .6 to 1.2 of what was taken. Noise: to eight clouds.
 _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
 _NEAR_NODE, _NODE = 2.1e-6, 5e-8
 _BAND_NEAR_NODE, _BAND_NODE = 4.3e-6, 1.5e-6

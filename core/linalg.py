@@ -73,6 +73,11 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Inner products of vectors stored component by component, three (...) each."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def lengths(a: np.ndarray) -> np.ndarray:
     """(m,) of vectors stored component by component, (3,m)."""
     return np.sqrt(np.einsum("im,im->m", a, a))

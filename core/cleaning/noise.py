@@ -9,7 +9,7 @@ from ..normals.mirrors import Mirrors
 from ..normals.reflection import reflection_sweeps
 from ..progress import Progress
 from ..voronoi.facets import voronoi_facets
-from .quadrics import nested_quadrics
+from .quadrics import GAUSS, nested_quadrics
 
 LADDER = (12, 20, 32, 50, 80, 128, 200)  # neighbours tried
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
@@ -19,7 +19,6 @@ _REGION = 70  # anchors over which errors are averaged; over 45 of 1600 the size
 _SMOOTHING = 18  # anchors over which the chosen neighbourhoods are averaged
 _SEEN = 10.0  # a fit shows the noise in full once its radius is this many times its left-out error
 _USABLE = 6.0  # and averages it, rather than following it, once its radius is this many times the noise
-_GAUSS = 1.4826  # standard deviations in a median absolute error
 _STRAY = 4.5  # errors count as at most this many median ones
 _FREEDOM = 2.0  # a robust fit follows its samples more than its leverage says
 _SAMPLES = 32768  # at a time
@@ -110,7 +109,7 @@ def _roughness(points, spacing, seed, progress):
     the anchors (m,) and their regions (m,k)."""
     anchors, region = _anchors(points, seed)
     fits = nested_quadrics(points, anchors, LADDER[:2], progress.part(0.0, 0.1))
-    fine, wide = (_GAUSS * np.median(fit.left_out()[region], axis=1) for fit in fits)
+    fine, wide = (GAUSS * np.median(fit.left_out()[region], axis=1) for fit in fits)
     relative = wide / np.median(spacing[anchors][region], axis=1)
     growth = wide / np.maximum(fine, np.finfo(float).tiny)
     everywhere, level = np.percentile(relative, (10, 50))

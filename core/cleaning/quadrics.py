@@ -6,10 +6,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..field.curvature import tangent_frames
-from ..linalg import COMPONENTS, principal_axes, solve_positive
+from ..linalg import COMPONENTS, dots, principal_axes, solve_positive
 from ..parallel import in_order
 from ..progress import Progress
 
+GAUSS = 1.4826  # standard deviations in a median absolute error
 COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
 _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
@@ -69,7 +70,7 @@ def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
     def fit(part):
         distance, index = tree.query(points[rows[part]], k=most)
         offset = [x.take(index) - x.take(rows[part])[:, None] for x in columns]
-        return [_fit(*(part[:, :k].copy() for part in (*offset, distance))) for k in sizes]
+        return [_fit([x[:, :k].copy() for x in offset], distance[:, :k].copy()) for k in sizes]
 
     for part, pieces in in_order(fit, Progress.of(progress).chunks(len(rows), max(1, _CHUNK // most))):
         for quadrics, piece in zip(found, pieces, strict=True):
@@ -77,19 +78,20 @@ def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
     return found
 
 
-def _fit(east, north, up, distance):
+def _fit(offset, distance):
     """Step, height, leverage and radius of quadrics through neighbours with offsets, three (m,k), from the sample."""
-    offset, radius = (east, north, up), distance[:, -1:]
+    radius = distance[:, -1:]
     weight = np.exp(-_DECAY * (distance / radius) ** 2)
     normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
     frame = tangent_frames(normal)
-    x, y, height = (_along(offset, axis) for axis in (frame[:, 0] / radius, frame[:, 1] / radius, normal))
+    axes = frame[:, 0] / radius, frame[:, 1] / radius, normal
+    x, y, height = (dots(offset, axis.T[:, :, None]) for axis in axes)
     basis = x, y, x * x, x * y, y * y
     coefficients, *_ = _weighted_fit(basis, weight, height)
     residual = height - coefficients[:, :1]
     for a, term in enumerate(basis, start=1):
         residual -= coefficients[:, a, None] * term
-    scale = _CAUCHY * 1.4826 * np.median(np.abs(residual), axis=1, keepdims=True)
+    scale = _CAUCHY * GAUSS * np.median(np.abs(residual), axis=1, keepdims=True)
     weight = weight / (1.0 + (residual / np.maximum(scale, _EXACT * radius)) ** 2)
     coefficients, matrix, full = _weighted_fit(basis, weight, height)
 
@@ -99,14 +101,6 @@ def _fit(east, north, up, distance):
     step = (coefficients[:, 0] / squared)[:, None] * upright
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
     return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95), radius[:, 0]
-
-
-def _along(offset, axis):
-    """Components (m,k) of offsets, three (m,k), along axes (m,3)."""
-    found = offset[0] * axis[:, 0, None]
-    found += offset[1] * axis[:, 1, None]
-    found += offset[2] * axis[:, 2, None]
-    return found
 
 
 def _least_spread(offset, share):

@@ -169,12 +169,12 @@ def one_sheet(step, normals, other_normals) -> np.ndarray:
     return _level(step, normals, other_normals) & _aligned(normals, other_normals, _FLAT)
 
 
-def _level(step, normals, other_normals, most=_STEP):
-    """Whether both ends of steps (...,3) are off each other's tangent plane by less than `most` times their length."""
+def _level(step, normals, other_normals, step_up=_STEP):
+    """Whether both ends of steps (...,3) are off each other's tangent plane by less than this share of their length."""
     height = np.maximum(
         np.abs(np.einsum("...i,...i->...", step, normals)), np.abs(np.einsum("...i,...i->...", step, other_normals))
     )
-    return height < most * np.linalg.norm(step, axis=-1)
+    return height < step_up * np.linalg.norm(step, axis=-1)
 
 
 def _aligned(normals, other_normals, least):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ..linalg import dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import excess
@@ -136,8 +137,8 @@ def membership(between, own, normals) -> np.ndarray:
 
     between : (3,m,k) from the one to the others     own : (3,m) its normal     normals : (3,m,k) theirs
     """
-    height, height_back = _dot(between, own[:, :, None]), _dot(between, normals)
-    return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(_dot(between, between), _TINY))
+    height, height_back = dots(between, own[:, :, None]), dots(between, normals)
+    return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(dots(between, between), _TINY))
 
 
 def _nearby(surface, x, nearest):
@@ -152,11 +153,11 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     distance = np.maximum(distance, 1e-9 * spacing)
     offset = np.stack([(x[:, a, None] - columns.points[a].take(sample)).astype(np.float32) for a in range(3)])
     normals = np.stack([axis.take(sample) for axis in columns.normals])
-    height = _dot(offset, normals)
+    height = dots(offset, normals)
     lateral = offset - height * normals
     xx, yy, zz, xy, xz, yz = (bend.take(sample) for bend in columns.bend)
-    bent = np.stack([_dot(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
-    above = (height - 0.5 * _dot(lateral, bent)) / np.sqrt(1 + _dot(bent, bent))
+    bent = np.stack([dots(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
+    above = (height - 0.5 * dots(lateral, bent)) / np.sqrt(1 + dots(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height)
     patch = excess(surface.rims, sample, lateral, spacing)
     return Nearby(sample, distance, spacing, offset, normals, height, above, kernel, pull, *patch)
@@ -192,7 +193,7 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     weight = near.kernel * member
     weight /= np.einsum("mk->m", weight)[:, None]
     axis = fused_axes(weight, near.pull, near.normals)
-    cosine = _dot(near.normals, axis.T.astype(np.float32)[:, :, None])
+    cosine = dots(near.normals, axis.T.astype(np.float32)[:, :, None])
     towards = weight * cosine
     tau = np.einsum("mk,mk->m", towards, near.above) / np.einsum("mk,mk->m", towards, cosine)
 
@@ -209,7 +210,3 @@ def _first_of_rows(marked):
     row, column = np.divmod(np.flatnonzero(marked), marked.shape[1])
     first = np.flatnonzero(np.diff(row, prepend=-1))
     return row[first], column[first]
-
-
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
