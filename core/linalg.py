@@ -83,6 +83,11 @@ def lengths(a: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("im,im->m", a, a))
 
 
+def outer_sum(terms: np.ndarray) -> np.ndarray:
+    """Sums of one term for each of three axes, (m,3,w) -> (m,w,w,w)."""
+    return terms[:, 0, :, None, None] + terms[:, 1, None, :, None] + terms[:, 2, None, None, :]
+
+
 def inner(a: np.ndarray, b: np.ndarray) -> float:
     """Sum of the products of two arrays of one shape."""
     return float((a * b).sum())

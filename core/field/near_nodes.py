@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from ..linalg import outer_sum
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC
@@ -65,8 +66,8 @@ def _around(shape, rim, half, width, at, normals, reach, sag):
     node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
     offset = node - at[:, :, None]
     reach, sag = (each.astype(np.float32)[:, None, None, None] for each in (reach, sag))
-    height = _outer_sum((normals[:, :, None] * offset).astype(np.float32))
-    lateral = _outer_sum((offset**2).astype(np.float32))
+    height = outer_sum((normals[:, :, None] * offset).astype(np.float32))
+    lateral = outer_sum((offset**2).astype(np.float32))
     lateral -= height * height
     np.sqrt(np.maximum(lateral, 0, out=lateral), out=lateral)
     off = np.maximum(np.abs(height, out=height) - sag, 0)
@@ -74,9 +75,4 @@ def _around(shape, rim, half, width, at, normals, reach, sag):
     lateral = np.maximum(np.subtract(lateral, reach, out=lateral), 0, out=lateral)
     off += lateral * lateral
     strides = np.array([shape[1] * shape[2], shape[2], 1])
-    return _outer_sum((node + rim) * strides[:, None])[off <= np.float32(width**2)]
-
-
-def _outer_sum(parts):
-    """Sums of one term per axis, (s,3,w) -> (s,w,w,w)."""
-    return parts[:, 0, :, None, None] + parts[:, 1, None, :, None] + parts[:, 2, None, None, :]
+    return outer_sum((node + rim) * strides[:, None])[off <= np.float32(width**2)]

@@ -19,6 +19,7 @@ from .mesh import Mesh
 from .pieces import pieces_with_samples
 from .settling import settled
 from .sides import Sides
+from .thin_parts import find_thin_parts
 from .triangles import mesh_of
 
 _CLAMP = 3.0  # cells; farther values do not matter for the mesh
@@ -39,13 +40,22 @@ def signed_distance(values, sides: Sides, surface: LocalSurface, place=np.asarra
 
 def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
     """The zero set of signed distances, (nx,ny,nz) float32 or Blocks, pulled onto the surface where that is within a
-    cell, and smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards."""
+    cell, and smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards.
+
+    Near parts that the signs of nodes do not show (see :mod:`.thin_parts`) the mesh starts off the surface, as a double
+    cover does: around what is too thin, inside of slits.
+    """
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
+    if thin := find_thin_parts(values, surface, grid, progress.part(0.0, 0.1)):
+        values = thin.lifted(values, grid)
     cells, faces = isosurface(each(lambda u: np.clip(u, -limit, limit), values), 0.0)
     vertices = grid.origin + grid.spacing * cells
+    if thin:
+        lifted = np.flatnonzero(thin.lift(vertices))
+        vertices[lifted] -= surface.project(vertices[lifted], progress.part(0.1, 0.2)).step
     vertices = evened(vertices, faces)
-    found = surface.project(vertices, progress.part(0.0, 0.7))
+    found = surface.project(vertices, progress.part(0.2, 0.7))
     on = found.distance <= grid.spacing
     vertices[on] = settled(vertices[on], found.step[on], surface, grid.spacing, progress.part(0.7, 0.9))
     progress(0.9)

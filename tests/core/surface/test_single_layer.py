@@ -230,3 +230,15 @@ def test_a_closed_surface_that_crosses_itself_is_followed_through_the_crossing()
     circle = 0.8 * np.stack([0 * turn, np.cos(turn), np.sin(turn)], axis=1)
     assert KDTree(circle).query(meeting)[0].max() < 2 * cell
     assert np.median(KDTree(sheet.vertices).query(circle)[0]) < 0.6 * cell
+
+
+def test_a_closed_surface_with_an_inward_crease_stays_one_manifold():
+    """Two balls grown together: along the crease it looks as if sheets met."""
+    centre, radius = np.array([1.4, 0, 0]), 0.6
+    ball, other = shapes.scattered_sphere(2500), centre + radius * shapes.scattered_sphere(900, 1)
+    ball = ball[np.linalg.norm(ball - centre, axis=1) > radius]
+    other = other[np.linalg.norm(other, axis=1) > 1]
+    run = single(np.concatenate([ball, other]), resolution=64, denoise=0)
+    assert set(run.sheet.edge_counts()[1]) == {2}
+    assert shapes.euler(run.sheet) == 2
+    assert run.report["warnings"] == []

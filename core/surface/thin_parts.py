@@ -1,0 +1,72 @@
+"""Parts of a closed shape that the signs of nodes do not show: too thin for one to lie inside, and slits as narrow."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..field.blocks import Blocks, at_nodes, each, marked_nodes, put
+from ..field.grid import Grid
+from ..field.local_surface import LocalSurface
+from ..linalg import outer_sum
+from ..parallel import in_order
+from ..progress import Progress
+
+_REACH = 1.25  # cells; where either side is thick, one of its nodes is as close to any sample
+_LEVEL = 0.8  # cells off the surface that the iso-surface is taken there
+_FULL, _END = 1.5, 4.0  # cells from such a sample, where it is taken as far off, and where no further
+_NEAR = 2.0  # cells from the surface, farther values do not matter for the mesh
+_CHUNK = 1 << 12  # samples
+
+
+@dataclass(frozen=True)
+class ThinParts:
+    """Samples (t,3) with no node inside near them, `thin`, and with none outside, `slits`."""
+
+    thin: np.ndarray
+    slits: np.ndarray
+    cell: float
+
+    def lift(self, x: np.ndarray) -> np.ndarray:
+        """How far outside of the surface the iso-surface is taken at x (m,3), (m,), units of the samples: 0.8 cells at
+        thin parts, as far inside of it at slits."""
+        lift = np.zeros(len(x))
+        for sign, samples in ((1.0, self.thin), (-1.0, self.slits)):
+            if len(samples):
+                away = KDTree(samples).query(x, distance_upper_bound=_END * self.cell, workers=-1)[0] / self.cell
+                lift += sign * _LEVEL * self.cell * np.clip((_END - away) / (_END - _FULL), 0.0, 1.0)
+        return lift
+
+    def lifted(self, values: np.ndarray | Blocks, grid: Grid) -> np.ndarray | Blocks:
+        """Signed distances (nx,ny,nz) float32 or Blocks, less the lift where the surface is near."""
+        limit = np.float32(_NEAR * self.cell)
+        node = marked_nodes(each(lambda u: np.abs(u) <= limit, values))
+        values = each(np.copy, values)
+        put(values, node, at_nodes(values, node) - self.lift(grid.positions(node)).astype(np.float32))
+        return values
+
+
+def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Grid, progress=None) -> ThinParts | None:
+    """Where samples have nodes within 1.25 cells on one side alone, by signed distances `values`, (nx,ny,nz) float32 or
+    Blocks; None where all have both."""
+
+    def one_sided(part):
+        node, squared = _nodes_around(surface.points[part], grid, int(np.ceil(_REACH)))
+        near, inside = squared <= _REACH**2, at_nodes(values, node) < 0
+        return np.stack([~(near & side).any(axis=(1, 2, 3)) for side in (inside, ~inside)])
+
+    chunks = Progress.of(progress).chunks(len(surface.points), _CHUNK)
+    thin, slit = np.concatenate([found for _, found in in_order(one_sided, chunks)], axis=1)
+    if not (thin | slit).any():
+        return None
+    return ThinParts(surface.points[thin], surface.points[slit], grid.spacing)
+
+
+def _nodes_around(points, grid, half):
+    """Flat indices of the nodes up to `half` along each axis from that nearest to each point, (n,w,w,w), nodes at the
+    side of the box in place of those past it, and squared distances from the point to them in cells."""
+    at, last = (points - grid.origin) / grid.spacing, np.array(grid.shape) - 1
+    node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
+    node = np.clip(node, 0, last[:, None])
+    strides = np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
+    return outer_sum(node * strides[:, None]), outer_sum((node - at[:, :, None]) ** 2)
