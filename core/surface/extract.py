@@ -14,10 +14,14 @@ from .crossings import find_crossings
 from .double_cover import CLAMP, double_cover, level_for
 from .isosurface import need_quads
 from .mesh import Mesh
+from .misfit import misfit
 from .pieces import without_small_pieces
 from .sides import find_sides, needed_band
 from .signed import signed_distance, signed_mesh
 from .single_layer import single_layer
+
+_TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
+_BETTER = 0.5  # times that distance, below which it is taken
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     needed = settings.band
     if settings.surface in WITH_SIDES:
         needed = max(needed, needed_band(local, grid))
-    if settings.surface in ("double", "both"):
+    if settings.surface in ("double", "both", "single"):
         needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
     return needed
 
@@ -72,8 +76,18 @@ def extract_surfaces(
         crossings = find_crossings(band, local, grid, progress.part(0.3, 0.5, "crossings"))
         sides = find_sides(values, crossings, local, grid, progress.part(0.5, 0.6, "crossings"))
     if kind in ("single", "both"):
-        part = progress.part(0.6, 1.0, "single layer")
+        part = progress.part(0.6, 0.9, "single layer")
         meshes["single"], unoriented = single_layer(values, crossings, sides, local, grid, part)
+        torn = misfit(meshes["single"], local.points)
+        if torn > _TORN * grid.spacing:
+            part = progress.part(0.9, 1.0, "single layer")
+            cover = meshes.get("double") or double_cover(values, band, local, grid, settings.offset, part)
+            if misfit(cover, local.points) < _BETTER * torn:
+                meshes["single"], unoriented = cover, 0
+                warnings.append(
+                    "sheets run closer than the cells of the grid, where a single layer is torn: the double cover is "
+                    "in its place; raise the resolution until they part"
+                )
         if unoriented:
             warnings.append(
                 f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "

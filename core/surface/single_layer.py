@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
-from ..linalg import cross, dots, lengths
 from ..progress import Progress
 from .centring import centred
 from .crossings import Crossings
 from .evening import evened
 from .holes import fill_pinholes
-from .mesh import Mesh, at_corners
+from .mesh import Mesh
+from .misfit import misfit
 from .orientation import orient
 from .pieces import pieces_with_samples
 from .planes import to_planes
@@ -30,7 +29,6 @@ from .triangles import mesh_of
 _MENDED = 2  # times, since holes may show where scraps are gone
 _MEETING = 0.01  # share of crossings at meetings of sheets
 _NEARER = 1.3  # times nearer to the samples that a dual contour is taken for
-_DISCS = 4  # faces that a sample may belong to
 _TOUCH = 0.35  # cells
 _STIFFNESS = 0.05  # of vertices where sheets meet
 
@@ -52,7 +50,7 @@ def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurfa
     contour = mended(dual_contour(crossings, surface, grid, progress.part(0.4, 0.9)), surface, grid.spacing)
     contour, unoriented = orient(contour)
     contour = centred(contour)
-    if sides.complete and _misfit(boundary, surface) <= _NEARER * _misfit(contour, surface):
+    if sides.complete and misfit(boundary, surface.points) <= _NEARER * misfit(contour, surface.points):
         return boundary, 0
     return contour, unoriented
 
@@ -60,21 +58,6 @@ def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurfa
 def _meet(crossings):
     """Whether sheets meet, or run close, in more than a stray place or two."""
     return len(crossings.node) > 0 and (crossings.normal != 0).any(axis=1).mean() > _MEETING
-
-
-def _misfit(mesh, surface):
-    """Mean distance of the samples to the mesh, infinite for one without faces: to discs around the nearest faces."""
-    if not len(mesh.faces):
-        return np.inf
-    corners = np.stack(at_corners(mesh.vertices, mesh.faces))
-    centre, normal = corners.mean(axis=0), cross(corners[1] - corners[0], corners[2] - corners[0])
-    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
-    radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
-    row = KDTree(centre.T).query(surface.points, k=range(1, 1 + min(_DISCS, len(mesh.faces))), workers=-1)[1]
-    off = surface.points.T[:, :, None] - centre[:, row]
-    height = dots(off, normal[:, row])
-    lateral = np.sqrt(np.maximum(dots(off, off) - height**2, 0)) - radius[row]
-    return np.hypot(height, np.maximum(lateral, 0)).min(axis=1).mean()
 
 
 def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:

@@ -1,0 +1,27 @@
+"""How far a mesh is from the samples."""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..linalg import cross, dots, lengths
+from .mesh import Mesh, at_corners
+
+_FACES = 4  # that a sample may belong to
+
+
+def misfit(mesh: Mesh, points: np.ndarray) -> float:
+    """Mean distance of the samples (n,3) to the mesh, in their units; infinite for one without faces.
+
+    Measured to discs around the centroids of the nearest faces, as large as these: a little less than to the triangles.
+    """
+    if not len(mesh.faces):
+        return np.inf
+    corners = np.stack(at_corners(mesh.vertices, mesh.faces))
+    centre, normal = corners.mean(axis=0), cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
+    row = KDTree(centre.T).query(points, k=range(1, 1 + min(_FACES, len(mesh.faces))), workers=-1)[1]
+    off = points.T[:, :, None] - centre[:, row]
+    height = dots(off, normal[:, row])
+    lateral = np.sqrt(np.maximum(dots(off, off) - height**2, 0)) - radius[row]
+    return float(np.hypot(height, np.maximum(lateral, 0)).min(axis=1).mean())
