@@ -12,8 +12,8 @@ from .planes import to_planes
 _TURN = 0.7  # largest cosine between the sides of sheets that form a corner
 _FACING = -0.97  # below this cosine they run close side by side
 _ABOVE = 0.02  # cells, least height of a vertex over the other sheet's plane
-_FAR = 9.0  # cells, how far a vertex may go
-_OFF, _FARTHEST = 0.25, 1.0  # cells, how far from the surface it may end, and how far from it planes may meet
+_FARTHEST = 9.0  # cells, how far a vertex may go where an offset lies between it and the corner
+_OFF, _APART = 0.25, 1.0  # cells, how far from the surface it may end, and how far from it planes may meet
 _STIFFNESS = 0.01
 _ADVANCES, _ADVANCE = 4, 0.4  # times that planes are laid again, and the share of the way that is gone each time
 _MET = 0.05  # cells, off the surface, where the first planes meet well enough
@@ -22,12 +22,15 @@ _SAME = 0.7  # least cosine between normals of one sheet there
 _ROUNDS = 4
 
 
-def into_corners(vertices, faces, side, surface: LocalSurface, cell: float, progress=None) -> np.ndarray:
+def into_corners(
+    vertices, faces, side, surface: LocalSurface, cell: float, progress=None, farthest: float = _FARTHEST
+) -> np.ndarray:
     """Vertices (v,3) of triangles or quads (f,k), each on a foot point, with one end of every edge that cuts a concave
     corner taken to where the planes of the sheets meet.
 
-    side : (v,3) float64, unit normals of the surface at the foot points, towards the side that the faces are on; zero
-           where there is none, past a rim
+    side     : (v,3) float64, unit normals of the surface at the foot points, towards the side that the faces are on;
+               zero where there is none, past a rim
+    farthest : cells, how far a vertex may go
 
     The iso-surface is an offset away from all sheets, so next to a corner no vertex falls into it. Ends that are closer
     to the corner go first. They stay where that would take them far or off the surface, between sheets that run close
@@ -46,7 +49,7 @@ def into_corners(vertices, faces, side, surface: LocalSurface, cell: float, prog
         vertices[row], side[row], np.append(low, high), np.append(high, low), surface, cell, progress
     )
     length = np.linalg.norm(step, axis=1)
-    length[(length > _FAR * cell) | (off > _FARTHEST * cell)] = np.inf
+    length[(length > farthest * cell) | (off > _APART * cell)] = np.inf
     chosen = _closest_ends(low, high, length)
     moved = vertices.copy()
     moved[row[chosen]] += step[chosen]

@@ -78,7 +78,7 @@ def extract_surfaces(
     if kind in ("single", "both"):
         part = progress.part(0.6, 0.9, "single layer")
         meshes["single"], unoriented = single_layer(values, crossings, sides, local, grid, part)
-        torn = misfit(meshes["single"], local.points)
+        torn = 0.0 if sides.complete else misfit(meshes["single"], local.points)
         if torn > _TORN * grid.spacing:
             part = progress.part(0.9, 1.0, "single layer")
             cover = meshes.get("double") or double_cover(values, band, local, grid, settings.offset, part)

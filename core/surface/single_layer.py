@@ -14,7 +14,6 @@ from .crossings import Crossings
 from .evening import evened
 from .holes import fill_pinholes
 from .mesh import Mesh
-from .misfit import misfit
 from .orientation import orient
 from .pieces import pieces_with_samples
 from .planes import to_planes
@@ -27,8 +26,6 @@ from .signed import signed_mesh
 from .triangles import mesh_of
 
 _MENDED = 2  # times, since holes may show where scraps are gone
-_MEETING = 0.01  # share of crossings at meetings of sheets
-_NEARER = 1.3  # times nearer to the samples that a dual contour is taken for
 _TOUCH = 0.35  # cells
 _STIFFNESS = 0.05  # of vertices where sheets meet
 
@@ -36,28 +33,18 @@ _STIFFNESS = 0.05  # of vertices where sheets meet
 def single_layer(values, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None):
     """The surface as one sheet: the boundary of the inside, where that is the whole surface; else :func:`dual_contour`.
 
-    Where a closed surface crosses itself, the boundary of the inside turns off before the crossing on either side, and
-    may grow handles. The dual contour goes through, and is taken if it is clearly nearer to the samples.
+    Where a closed surface crosses itself, the boundary of the inside turns off just before the crossing on either side,
+    and may have handles there.
 
     values : (nx,ny,nz) float32 or Blocks, unsigned distances
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress = Progress.of(progress)
     if sides.complete:
-        boundary = signed_mesh(sides.sign(values), surface, grid, progress.part(0.0, 0.4))
-        if not _meet(crossings):
-            return boundary, 0
-    contour = mended(dual_contour(crossings, surface, grid, progress.part(0.4, 0.9)), surface, grid.spacing)
+        return signed_mesh(sides.sign(values), surface, grid, progress), 0
+    contour = mended(dual_contour(crossings, surface, grid, progress.part(0.0, 0.9)), surface, grid.spacing)
     contour, unoriented = orient(contour)
-    contour = centred(contour)
-    if sides.complete and misfit(boundary, surface.points) <= _NEARER * misfit(contour, surface.points):
-        return boundary, 0
-    return contour, unoriented
-
-
-def _meet(crossings):
-    """Whether sheets meet, or run close, in more than a stray place or two."""
-    return len(crossings.node) > 0 and (crossings.normal != 0).any(axis=1).mean() > _MEETING
+    return centred(contour), unoriented
 
 
 def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
