@@ -54,6 +54,7 @@ CASES = {
     "box_10k": Recipe("watertight", closed.rounded_box, 10_000),
     "bumps_10k": Recipe("watertight", closed.bumps, 10_000, quick=True),
     "knot_10k": Recipe("watertight", closed.knot, 10_000),
+    "horned_10k": Recipe("watertight", closed.horned, 10_000),
     "bumps_100k": Recipe("watertight", closed.bumps, 100_000),
     "hemisphere_2k": Recipe("open", bordered.hemisphere, 2_000),
     "mask_5k": Recipe("open", bundled_mask, 5_000),

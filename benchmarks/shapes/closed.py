@@ -51,6 +51,18 @@ def knot() -> Surface:
     return from_patches([Patch(position, (1400, 100))])
 
 
+def horned() -> Surface:
+    """A ball with a horn at either pole, whose outer half is thinner than a cell of 128 along the longest side: radius
+    1 + 1.2 exp(-50 sin t) at polar angle t."""
+
+    def position(uv):
+        u = uv[:, 0]
+        polar = u - 0.9 * np.sin(TURN * u) / TURN  # close together at the poles
+        return _polar(1 + 1.2 * np.exp(-50 * np.abs(np.sin(np.pi * polar))), np.stack([polar, uv[:, 1]], axis=1))
+
+    return from_patches([Patch(position, (1200, 160))])
+
+
 def cube() -> Surface:
     """Sharp edges and corners."""
     return from_patches(box((-1, -1, -1), (1, 1, 1)))
