@@ -98,9 +98,9 @@ def extract_surfaces(
         meshes["signed"] = signed_mesh(values, local, grid, progress.part(0.6, 1.0, "signed surface"))
         if not sides.complete:
             warnings.append(
-                f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls) and is not in "
-                f"the signed surface, which spans openings of {sides.spanned:.1%} of its area; compare it with the "
-                "single layer"
+                f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where the "
+                f"signed surface has a face on either side; it spans openings of {sides.spanned:.1%} of its area; "
+                "compare it with the single layer"
             )
     for kind, mesh in meshes.items():
         mesh = mesh if settings.faces == "quads" else replace(mesh, pairs=0)

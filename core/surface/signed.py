@@ -48,13 +48,14 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     cell, and smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards.
 
     Near parts that the signs of nodes do not show (see :mod:`.thin_parts`) the mesh starts off the surface, as a double
-    cover does: around what is too thin, inside of slits.
+    cover does: around what is too thin, inside of slits. So flaps and inner walls have a face on either side.
     """
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
+    values = each(lambda u: np.clip(u, -limit, limit), values)
     if thin := find_thin_parts(values, surface, grid, progress.part(0.0, 0.1)):
-        values = thin.lifted(values, grid)
-    cells, faces = isosurface(each(lambda u: np.clip(u, -limit, limit), values), 0.0)
+        thin.lower(values, grid)
+    cells, faces = isosurface(values, 0.0)
     vertices = grid.origin + grid.spacing * cells
     if thin:
         lifted = np.flatnonzero(thin.lift(vertices))

@@ -37,13 +37,11 @@ class ThinParts:
                 lift += sign * _LEVEL * self.cell * np.clip((_END - away) / (_END - _FULL), 0.0, 1.0)
         return lift
 
-    def lifted(self, values: np.ndarray | Blocks, grid: Grid) -> np.ndarray | Blocks:
-        """Signed distances (nx,ny,nz) float32 or Blocks, less the lift where the surface is near."""
+    def lower(self, values: np.ndarray | Blocks, grid: Grid) -> None:
+        """Take the lift off signed distances (nx,ny,nz) float32 or Blocks, in place, where the surface is near."""
         limit = np.float32(_NEAR * self.cell)
         node = marked_nodes(each(lambda u: np.abs(u) <= limit, values))
-        values = each(np.copy, values)
         put(values, node, at_nodes(values, node) - self.lift(grid.positions(node)).astype(np.float32))
-        return values
 
 
 def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Grid, progress=None) -> ThinParts | None:

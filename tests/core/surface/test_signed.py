@@ -143,8 +143,12 @@ def test_a_wall_inside_is_refused():
         signed(np.concatenate([shapes.cube(2400), shapes.square(400)]))
 
 
-def test_a_flap_is_left_out_and_told():
+def test_a_flap_has_a_face_on_either_side_and_is_told():
     run = signed(np.concatenate([shapes.sphere(1500), FLAP]))
+    ball, flap = shapes.components(run.surface)
+    assert shapes.euler(ball) == shapes.euler(flap) == 2
+    np.testing.assert_allclose(flap.vertices[:, 2], 1.6, atol=0.05 * run.field.spacing)
+    assert flap.face_areas().sum() == pytest.approx(2 * np.pi * 0.4**2, rel=0.1)
     assert shapes.signed_volume(run.surface) == pytest.approx(4 / 3 * np.pi, rel=0.02)
     assert [warning for warning in run.report["warnings"] if "same side on both faces" in warning]
 
