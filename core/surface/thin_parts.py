@@ -49,7 +49,7 @@ def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Gr
     Blocks; None where all have both."""
 
     def one_sided(part):
-        node, squared = _nodes_around(surface.points[part], grid, int(np.ceil(_REACH)))
+        node, squared = _nodes_around(surface.points[part], grid, int(np.ceil(_REACH - 0.5)))
         near, inside = squared <= _REACH**2, at_nodes(values, node) < 0
         return np.stack([~(near & side).any(axis=(1, 2, 3)) for side in (inside, ~inside)])
 
