@@ -77,9 +77,8 @@ def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, prog
     feet[doubtful] -= again.step
     kept[doubtful] = again.distance <= _SETTLED * grid.spacing
     node, near, feet = node[kept], near[kept], feet[kept]
-    normals = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
     radius = np.where(near.past_rim, 0.0, _RADIUS * grid.spacing)
-    return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in (feet, normals, radius)))
+    return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in (feet, near.direction, radius)))
 
 
 def no_farther_than_feet(projected: np.ndarray, to_feet: np.ndarray, grid: Grid) -> np.ndarray:

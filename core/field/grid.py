@@ -26,6 +26,11 @@ class Grid:
         return np.ravel_multi_index(cells.T, self.shape)
 
 
+def node_strides(shape: tuple[int, int, int]) -> np.ndarray:
+    """Steps of the flat index of nodes along the three axes, (3,) int64."""
+    return np.array([shape[1] * shape[2], shape[2], 1])
+
+
 def fit_grid(points: np.ndarray, resolution: int) -> Grid:
     """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
     longest side, as many as needed along the others."""

@@ -7,7 +7,7 @@ from ..linalg import outer_sum
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC
-from .grid import Grid
+from .grid import Grid, node_strides
 from .local_surface import LocalSurface
 
 _MARGIN = 0.1  # cells, for surfaces blended of patches that differ
@@ -74,5 +74,4 @@ def _around(shape, rim, half, width, at, normals, reach, sag):
     off *= off
     lateral = np.maximum(np.subtract(lateral, reach, out=lateral), 0, out=lateral)
     off += lateral * lateral
-    strides = np.array([shape[1] * shape[2], shape[2], 1])
-    return outer_sum((node + rim) * strides[:, None])[off <= np.float32(width**2)]
+    return outer_sum((node + rim) * node_strides(shape)[:, None])[off <= np.float32(width**2)]

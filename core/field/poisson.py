@@ -43,7 +43,7 @@ def poisson(
         direction = grid_axes(*samples, grid, STRIDE, progress.part(0.0, 0.5))
     else:
         found = surface.project(nodes, progress.part(0.0, 0.5))
-        start, direction = found.distance, found.step / np.maximum(found.distance, np.finfo(float).tiny)[:, None]
+        start, direction = found.distance, found.direction
     direction = direction.reshape(*known.shape, 3) * coarse.spacing
 
     anchor = np.where(np.isnan(known), 0.0, _ANCHOR)

@@ -47,6 +47,11 @@ class Projection:
     past_rim: np.ndarray
     spread: np.ndarray
 
+    @property
+    def direction(self) -> np.ndarray:
+        """(m,3) float64, the steps made unit; zero for queries on the surface."""
+        return self.step / np.maximum(self.distance, np.finfo(float).tiny)[:, None]
+
     def __getitem__(self, chosen) -> "Projection":
         return Projection(*(getattr(self, field.name)[chosen] for field in fields(self)))
 

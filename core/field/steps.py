@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .grid import CORNERS
+from .grid import CORNERS, node_strides
 
 _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point at each other
 
@@ -43,7 +43,7 @@ class NearBand:
         sheet that is not there. Steps of neighbouring nodes point at each other there; such cells are left out.
         """
         lowest = np.clip(np.floor(cells).astype(np.int64), 0, np.array(shape) - 2)
-        strides = np.array([shape[1] * shape[2], shape[2], 1])
+        strides = node_strides(shape)
         row = self.rows((lowest @ strides)[:, None] + CORNERS @ strides)
         chosen = np.flatnonzero((row >= 0).all(axis=1))
         if off_rims:

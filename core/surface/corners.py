@@ -75,7 +75,7 @@ def _to_meetings(place, side, corner, other, surface, cell, progress):
     for part in between:
         x = at + share * (place + further - at) + _LIFT * cell * normal
         near = surface.project(x, part)
-        fresh = near.step / np.maximum(near.distance, np.finfo(float).tiny)[:, None]
+        fresh = near.direction
         same = ((np.einsum("vi,vi->v", fresh, normal) > _SAME) & ~near.past_rim)[:, None]
         at, normal, share = np.where(same, x - near.step, at), np.where(same, fresh, normal), share * (1 - 0.5 * ~same)
         further = to_planes(place, both, at[planes], normal[planes], _STIFFNESS)

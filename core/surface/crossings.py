@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..field.grid import CORNERS, Grid
+from ..field.grid import CORNERS, Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
@@ -50,7 +50,7 @@ class Crossings:
 
     def cells_around(self, grid: Grid) -> np.ndarray:
         """The four cells around each edge in cyclic order, by their lowest nodes, (e,4)."""
-        return _cells_around(self.node, self.axis, node_strides(grid))
+        return _cells_around(self.node, self.axis, node_strides(grid.shape))
 
     def changing_sides(self) -> np.ndarray:
         """Edges, as 3 * node + axis, ascending, whose ends are on two sides: crossed an odd number of times."""
@@ -60,7 +60,7 @@ class Crossings:
 
 def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
     """Crossings of the zero set, from the nodes near it."""
-    progress, strides, hair = Progress.of(progress), node_strides(grid), _HAIR * grid.spacing
+    progress, strides, hair = Progress.of(progress), node_strides(grid.shape), _HAIR * grid.spacing
     meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.4))
     progress(0.4)
     cells, side = _sides(band, grid)
@@ -101,7 +101,7 @@ def _may_be_covered(band, edge, place, grid):
     node, axis = np.divmod(edge, 3)
     along = (place - grid.positions(node)).sum(axis=1)
     below, above = (
-        np.linalg.norm(band.step[band.rows(end)], axis=1) for end in (node, node + node_strides(grid)[axis])
+        np.linalg.norm(band.step[band.rows(end)], axis=1) for end in (node, node + node_strides(grid.shape)[axis])
     )
     least = np.maximum(below - along, above - (grid.spacing - along))
     return least <= (_COVERED + _SLACK) * grid.spacing
@@ -122,17 +122,12 @@ def _cells_around(node, axis, strides):
     return node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
 
 
-def node_strides(grid: Grid) -> np.ndarray:
-    """Steps of the flat node index along the three axes."""
-    return np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
-
-
 def _sides(band, grid):
     """Cells with all corners in the band, by their lowest node, (c,) ascending, and each corner's signed distance along
     the cell's normal, (c,8); the sign is the cell's own."""
     at = np.stack(np.unravel_index(band.node, grid.shape), axis=1)
     lowest = band.node[(at < np.array(grid.shape) - 1).all(axis=1)]
-    corner = np.stack([band.rows(lowest + step) for step in CORNERS @ node_strides(grid)], axis=1)
+    corner = np.stack([band.rows(lowest + step) for step in CORNERS @ node_strides(grid.shape)], axis=1)
     whole = (corner >= 0).all(axis=1)
     lowest, corner = lowest[whole], corner[whole]
     step = band.step[corner] + _HAIR * grid.spacing
@@ -146,7 +141,7 @@ def _vote(cells, side, grid):
     """Edges of the cells, as lower node * 3 + axis (e,), votes that they are crossed, positive if so, (e,), and the
     likely places (e,3)."""
     a, b = side[:, _EDGES[:, 0]], side[:, _EDGES[:, 1]]
-    key = 3 * (cells[:, None] + CORNERS[_EDGES[:, 0]] @ node_strides(grid)) + _EDGE_AXIS
+    key = 3 * (cells[:, None] + CORNERS[_EDGES[:, 0]] @ node_strides(grid.shape)) + _EDGE_AXIS
     opposite = (a >= 0) != (b >= 0)
     certain = np.minimum(np.abs(a), np.abs(b)) + 1e-9 * grid.spacing
     share = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)

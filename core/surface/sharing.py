@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..field.grid import Grid
-from .crossings import Crossings, node_strides
+from ..field.grid import Grid, node_strides
+from .crossings import Crossings
 
 _BENT, _OFF = 0.3, 0.05  # crossings of a sheet are off each other's planes by this share of their distance, and cells
 _STEEP = 0.7  # |n . n'| of sheets that meet
@@ -73,7 +73,7 @@ def _compare(crossings, a, b, cell):
 
 def _at_end(vertex, corner, cell, crossings, owner, grid):
     """Whether each corner's sheet ends in its cell: it crosses an odd number of the edges of a face of the cell."""
-    strides = node_strides(grid)
+    strides = node_strides(grid.shape)
     offset = crossings.node[owner] - cell[corner]
     side = np.stack([offset // strides[0], offset % strides[0] // strides[1], offset % strides[1]], axis=1)
     count = np.zeros((vertex.max(initial=-1) + 1, 6), np.int64)

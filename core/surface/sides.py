@@ -19,10 +19,10 @@ from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
-from ..field.grid import Grid
+from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
-from .crossings import Crossings, node_strides
+from .crossings import Crossings
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
@@ -122,12 +122,12 @@ def _edges_of(node, near, crossings, grid):
     """Grid edges with an end among the nodes, those marked in `near`, none of which lies on the side of the box: their
     ends (e,), (e,) and whether the surface crosses them."""
     keys = []
-    for axis, stride in enumerate(node_strides(grid)):
+    for axis, stride in enumerate(node_strides(grid.shape)):
         below = node - stride
         keys += [3 * node + axis, 3 * below[~at_nodes(near, below)] + axis]
     keys = np.concatenate(keys)
     node, axis = np.divmod(keys, 3)
-    return node, node + node_strides(grid)[axis], np.isin(keys, crossings.changing_sides())
+    return node, node + node_strides(grid.shape)[axis], np.isin(keys, crossings.changing_sides())
 
 
 def _sides(a, b, crossed, n, outside, progress):

@@ -82,10 +82,9 @@ def _sharpened(vertices, faces, surface, cell, progress):
         bent, side = np.flatnonzero(least < FLAT), np.zeros_like(vertices)
         way = outward * normal[bent]
         found = surface.project(vertices[bent] + _ASIDE * cell * way, part.part(0.0, 0.5))
-        axis = found.step / np.maximum(found.distance, np.finfo(float).tiny)[:, None]
-        back = np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
-        clear = back & (np.einsum("vi,vi->v", axis, way) > 0) & ~found.past_rim
-        side[bent[clear]] = axis[clear]
+        direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
+        clear = back & (np.einsum("vi,vi->v", direction, way) > 0) & ~found.past_rim
+        side[bent[clear]] = direction[clear]
         vertices = into_corners(vertices, faces, side, surface, cell, part.part(0.5, 1.0), _INTO)
     return vertices
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, at_nodes, each, marked_nodes, put
-from ..field.grid import Grid
+from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..linalg import outer_sum
 from ..parallel import in_order
@@ -66,5 +66,4 @@ def _nodes_around(points, grid, half):
     at, last = (points - grid.origin) / grid.spacing, np.array(grid.shape) - 1
     node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
     node = np.clip(node, 0, last[:, None])
-    strides = np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
-    return outer_sum(node * strides[:, None]), outer_sum((node - at[:, :, None]) ** 2)
+    return outer_sum(node * node_strides(grid.shape)[:, None]), outer_sum((node - at[:, :, None]) ** 2)

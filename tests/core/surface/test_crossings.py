@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from core import Cancelled, estimate_normals
-from core.field.grid import Grid, fit_grid
+from core.field.grid import Grid, fit_grid, node_strides
 from core.field.integration import BAND, distance_field
 from core.field.local_surface import fit_local_surface
 from core.field.steps import NearBand
 from core.points import local_spacing
-from core.surface.crossings import _HAIR, Crossings, _may_be_covered, find_crossings, node_strides
+from core.surface.crossings import _HAIR, Crossings, _may_be_covered, find_crossings
 from tests import shapes
 
 GRID = Grid(np.array([-1.31, -1.29, -1.33]), 0.1, (28, 27, 28))
@@ -74,7 +74,7 @@ def test_places_lie_on_the_surface_and_on_their_edges(sphere_crossings):
 
 
 def test_cells_around_an_edge_share_it():
-    strides = node_strides(GRID)
+    strides = node_strides(GRID.shape)
     assert strides.tolist() == [27 * 28, 28, 1]
     node = np.full(3, strides @ [5, 6, 7])
     cells = Crossings(node, np.arange(3), np.zeros((3, 3)), np.empty(0, int), np.zeros((3, 3))).cells_around(GRID)

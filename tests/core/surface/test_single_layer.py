@@ -248,13 +248,14 @@ def test_a_closed_surface_with_an_inward_crease_stays_one_manifold():
     assert run.report["warnings"] == []
 
 
-def test_where_sheets_run_closer_than_cells_the_double_cover_is_kept():
+@pytest.mark.parametrize("band", [None, 4.0])
+def test_where_sheets_run_closer_than_cells_the_double_cover_is_kept(band):
     """A ball pressed flat, .8 cells thick: as a single layer it had 140 edges of three faces and more, and holes."""
     points = shapes.scattered_sphere(4000) * [1, 1, 0.02] @ shapes.random_rotation(4).T
-    run = reconstruct(points, Settings(resolution=48, surface="both", denoise=0))
+    run = reconstruct(points, Settings(resolution=48, surface="both", band=band, denoise=0))
     np.testing.assert_array_equal(run.sheet.vertices, run.surface.vertices)
     assert shapes.euler(run.sheet) == 2
     assert any("the double cover is in its place" in warning for warning in run.report["warnings"])
-    alone = reconstruct(points, Settings(resolution=48, surface="single", denoise=0))
+    alone = reconstruct(points, Settings(resolution=48, surface="single", band=band, denoise=0))
     np.testing.assert_array_equal(alone.sheet.vertices, run.sheet.vertices)
     assert alone.surface is None
