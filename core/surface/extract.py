@@ -77,7 +77,7 @@ def extract_surfaces(
         sides = find_sides(values, crossings, local, grid, progress.part(0.5, 0.6, "crossings"))
     if kind in ("single", "both"):
         part = progress.part(0.6, 0.9, "single layer")
-        meshes["single"], unoriented = single_layer(values, crossings, sides, local, grid, part)
+        meshes["single"], unoriented = single_layer(values, band, crossings, sides, local, grid, part)
         torn = 0.0 if sides.complete else misfit(meshes["single"], local.points)
         if torn > _TORN * grid.spacing:
             part = progress.part(0.9, 1.0, "single layer")

@@ -11,13 +11,15 @@ from .mesh import Mesh
 
 _SAMPLE_AT = 1.5  # cells
 _FEW, _MANY = 8, 80  # samples
+_TINY = 24  # faces
 
 
 def pieces_with_samples(mesh: Mesh, samples: KDTree, cell: float) -> Mesh:
     """The mesh without the crumbs that a field may leave between sheets and in narrow places.
 
-    A piece has the samples nearest to its vertices within 1.5 cells. A crumb has none, or fewer than 8 that all lie
-    within 1.5 cells of a piece of 80 or more: what else is small stays, since no other piece shows it.
+    A piece has the samples nearest to its vertices within 1.5 cells. A crumb has none, or fewer than 8 samples or 24
+    faces, if its samples all lie within 1.5 cells of a piece of 80 or more: what else is small stays, since no other
+    piece shows it.
     """
     reach = _SAMPLE_AT * cell
     distance, nearest = samples.query(mesh.vertices, distance_upper_bound=reach, workers=-1)
@@ -25,9 +27,10 @@ def pieces_with_samples(mesh: Mesh, samples: KDTree, cell: float) -> Mesh:
     touched = distance < np.inf
     of, sample = np.divmod(np.unique(piece[touched].astype(np.int64) * samples.n + nearest[touched]), samples.n)
     number = np.bincount(of, minlength=count)
-    small = np.flatnonzero(number[of] < _FEW)
+    few = (number < _FEW) | (np.bincount(piece[mesh.faces[:, 0]], minlength=count) < _TINY)
+    small = np.flatnonzero(few[of])
     alone = ~_within(samples.data[sample[small]], mesh.vertices[number[piece] >= _MANY], reach)
-    kept = (number >= _FEW) | (np.bincount(of[small], alone, count) > 0)
+    kept = ~few | (np.bincount(of[small], alone, count) > 0)
     return _only(mesh, kept[piece])
 
 

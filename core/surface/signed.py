@@ -4,8 +4,6 @@ The paper's appendix orients the samples and integrates a second time with orien
 already and only their sides are missing (see :mod:`.sides`).
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.sparse import coo_matrix
 
@@ -15,20 +13,16 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
 from .centring import centred
-from .corners import into_corners
-from .evening import FLAT, evened, vertex_normals
-from .isosurface import isosurface
+from .evening import evened
 from .mesh import Mesh
 from .pieces import pieces_with_samples
 from .settling import settled
 from .sides import Sides
-from .thin_parts import find_thin_parts
 from .triangles import mesh_of
+from .zero_set import sharpened, zero_set
 
 _CLAMP = 3.0  # cells; farther values do not matter for the mesh
 _SMOOTHING = 20  # rounds, over gaps
-_ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
-_INTO = 1.5  # cells, how far a vertex may go into a crease
 
 
 def signed_distance(values, sides: Sides, surface: LocalSurface, place=np.asarray) -> np.ndarray | Blocks:
@@ -53,40 +47,17 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
     values = each(lambda u: np.clip(u, -limit, limit), values)
-    if thin := find_thin_parts(values, surface, grid, progress.part(0.0, 0.1)):
-        thin.lower(values, grid)
-    cells, faces = isosurface(values, 0.0)
-    vertices = grid.origin + grid.spacing * cells
-    if thin:
-        lifted = np.flatnonzero(thin.lift(vertices))
-        vertices[lifted] -= surface.project(vertices[lifted], progress.part(0.1, 0.2)).step
+    vertices, faces = zero_set(values, surface, grid, progress.part(0.0, 0.2))
     vertices = evened(vertices, faces)
     found = surface.project(vertices, progress.part(0.2, 0.7))
     on = found.distance <= grid.spacing
     vertices[on] = settled(vertices[on], found.step[on], surface, grid.spacing, progress.part(0.7, 0.8))
     mesh = mesh_of(vertices, faces)
-    vertices = _sharpened(mesh.vertices, mesh.faces, surface, grid.spacing, progress.part(0.8, 0.9))
-    mesh = centred(replace(mesh, vertices=vertices))
+    mesh = centred(sharpened(mesh, surface, grid.spacing, progress.part(0.8, 0.9)))
     progress(0.92)
     _relax(mesh, np.flatnonzero(~on))
     progress(0.96)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
-
-
-def _sharpened(vertices, faces, surface, cell, progress):
-    """Vertices (v,3) on the surface with those next to creases taken into them: inward ones, then outward ones, which
-    are inward seen from inside."""
-    for turn, outward in enumerate((1.0, -1.0)):
-        part = progress.part(turn / 2, (turn + 1) / 2)
-        normal, least = vertex_normals(vertices, faces)
-        bent, side = np.flatnonzero(least < FLAT), np.zeros_like(vertices)
-        way = outward * normal[bent]
-        found = surface.project(vertices[bent] + _ASIDE * cell * way, part.part(0.0, 0.5))
-        direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
-        clear = back & (np.einsum("vi,vi->v", direction, way) > 0) & ~found.past_rim
-        side[bent[clear]] = direction[clear]
-        vertices = into_corners(vertices, faces, side, surface, cell, part.part(0.5, 1.0), _INTO)
-    return vertices
 
 
 def _relax(mesh, loose):

@@ -49,12 +49,13 @@ def joined(*parts):
     return Mesh(np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces).astype(np.int32))
 
 
-@pytest.mark.parametrize(("count", "kept"), [(6, False), (8, True)])
-def test_a_piece_along_few_samples_of_a_large_one_is_a_crumb(count, kept):
-    """A large strip of samples and, half a cell above it, a small one."""
-    large, small = strip(0, 100), strip(0.5, count - 2)
-    mesh = joined(large, small)
-    found = pieces_with_samples(mesh, KDTree(large[0]), 1.0)
+@pytest.mark.parametrize(
+    ("faces", "every", "kept"), [(6, 1, False), (23, 1, False), (24, 1, True), (24, 4, False), (32, 4, True)]
+)
+def test_a_piece_of_few_faces_or_samples_along_a_large_one_is_a_crumb(faces, every, kept):
+    """A large strip, some of whose vertices are the samples, and, half a cell above it, a small one."""
+    large, small = strip(0, 400), strip(0.5, faces)
+    found = pieces_with_samples(joined(large, small), KDTree(large[0][::every]), 1.0)
     assert len(found.vertices) == len(large[0]) + (len(small[0]) if kept else 0)
 
 

@@ -1,0 +1,88 @@
+"""The single layer of a surface with two sides: where its signed distances are zero, as far as its rims."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ..field.blocks import Blocks, at_nodes
+from ..field.grid import Grid
+from ..field.local_surface import LocalSurface
+from ..field.steps import NearBand
+from ..progress import Progress
+from .evening import evened
+from .first_steps import first_steps
+from .mesh import Mesh
+from .pieces import pieces_with_samples
+from .settling import settled
+from .triangles import mesh_of
+from .zero_set import sharpened, zero_set
+
+_NEAR = 1.0  # cells, distance of the node next to a vertex; farther ones are where the distances end
+_COVERED = 0.4  # cells, a face whose middle is this close to the surface is on it, a farther one past its rim
+_FAR = 1.0  # cells, that faces past a rim reach off the surface; those in cracks and along creases do not
+
+
+def open_sheet(values: np.ndarray | Blocks, band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
+    """The zero set of signed distances (nx,ny,nz) float32 or Blocks near the surface, which :func:`two_sided` gives and
+    which may be changed, on its foot points and without what is past its rims: two faces at each edge or one, wound
+    alike, with ragged borders."""
+    progress, cell = Progress.of(progress), grid.spacing
+    vertices, faces = zero_set(values, surface, grid, progress.part(0.0, 0.2))
+    node = grid.nearest_nodes(np.clip(vertices, grid.origin, grid.origin + cell * (np.array(grid.shape) - 1)))
+    near = np.abs(at_nodes(values, node)) <= _NEAR * cell
+    vertices, faces = _of_faces(vertices, faces, near[faces].all(axis=1))
+    vertices, faces = _trimmed(vertices, faces, band, surface, grid, progress.part(0.2, 0.4))
+    vertices = evened(vertices, faces)
+    step = surface.project(vertices, progress.part(0.4, 0.7)).step
+    mesh = mesh_of(settled(vertices, step, surface, cell, progress.part(0.7, 0.8)), faces)
+    return pieces_with_samples(sharpened(mesh, surface, cell, progress.part(0.8, 1.0)), surface.tree, cell)
+
+
+def _trimmed(vertices, faces, band, surface, grid, progress):
+    """Without the faces whose middle is off the surface, if they are connected to ones that are far off; where one is
+    gone, vertices are in the middle of the others' foot points."""
+    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.0, 0.5))
+    limit, middle = _COVERED * grid.spacing, vertices[faces].mean(axis=1)
+    row = np.flatnonzero((past_rim | (np.linalg.norm(step, axis=1) > limit))[faces].any(axis=1))
+    found = surface.project(middle[row], progress.part(0.5, 1.0))
+    middle[row] -= found.step
+    off = found.distance > limit
+    kept = np.ones(len(faces), bool)
+    kept[row[off]] = ~_connected_to(found.distance[off] > _FAR * grid.spacing, faces[row[off]])
+    corner, at = faces[kept].reshape(-1), np.repeat(middle[kept], faces.shape[1], axis=0)
+    share = np.bincount(corner, minlength=len(vertices))
+    rim = np.intersect1d(faces[~kept], corner)
+    total = np.stack([np.bincount(corner, x, len(vertices)) for x in at.T], axis=1)
+    vertices = vertices.copy()
+    vertices[rim] = total[rim] / share[rim, None]
+    return _apart(*_of_faces(vertices, faces, kept))
+
+
+def _apart(vertices, faces):
+    """With a vertex for each of the sheets that have no more than it in common."""
+    low, high = np.sort([faces, np.roll(faces, -1, axis=1)], axis=0).reshape(2, -1)
+    edge = np.unique(low * len(vertices) + high, return_inverse=True)[1].reshape(-1)
+    sheet = _connected(edge.reshape(faces.shape))
+    key, corners = np.unique(faces + len(vertices) * sheet[:, None], return_inverse=True)
+    return vertices[key % len(vertices)], corners.reshape(faces.shape)
+
+
+def _connected_to(marked, faces):
+    """Which faces (f,k) are marked, (f,) bool, or connected to one that is, (f,) bool."""
+    part = _connected(np.unique(faces, return_inverse=True)[1].reshape(faces.shape))
+    return np.isin(part, part[marked])
+
+
+def _connected(shared):
+    """Number of the connected set of each face, (f,), where faces with the same number among their `shared` (f,k), of
+    vertices or edges, are connected."""
+    count, owner = len(shared), np.repeat(np.arange(len(shared)), shared.shape[1])
+    n = count + shared.max(initial=-1) + 1
+    graph = coo_matrix((np.ones(len(owner), bool), (owner, count + shared.reshape(-1))), shape=(n, n))
+    return connected_components(graph, directed=False)[1][:count]
+
+
+def _of_faces(vertices, faces, kept):
+    """The faces marked in `kept`, (f,) bool, and the vertices that they have."""
+    used, corners = np.unique(faces[kept], return_inverse=True)
+    return vertices[used], corners.reshape(-1, faces.shape[1])

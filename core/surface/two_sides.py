@@ -1,0 +1,207 @@
+"""The two sides of a surface that bounds no inside: an open sheet's, or those of sheets that pass through each other.
+
+The samples are oriented so that the nodes around them agree, as the paper's appendix does for closed shapes, with
+votes of the grid's edges in place of an outside: nodes that no crossing parts are on one side, nodes of a crossed edge
+on two. As in :mod:`.sides` the least frustrated state is wanted (Kunegis et al., SDM 2010), here without a node whose
+side is known, so it is the first eigenvector of the signed Laplacian, by inverse iteration from the orientations that
+the surest votes give along a spanning tree.
+
+A one-sided surface has no such state, nor have three sheets that meet in a line. There the votes that are overruled
+form a patch as long as the sheet is wide, or one that parts the surface around it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+from scipy.sparse.linalg import cg
+from scipy.spatial import KDTree
+
+from ..field.blocks import Blocks, each, put
+from ..field.grid import Grid, node_strides
+from ..field.local_surface import LocalSurface
+from ..field.steps import NearBand
+from ..progress import Progress
+from .crossings import Crossings
+
+_BEYOND = 3.0  # cells, distance that nodes out of the band count as
+_ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 10, 300, 1e-3, 1e-3
+_SWEEPS = 12
+_LEAST = 0.1  # cells, distance of nodes past a rim from the sheet continued, if they are across a crossing
+_ADJACENT = 1.8  # cells, overruled votes of one patch
+_SHORT = 2.0  # cells, shorter patches do not count
+_LONG = 1 / 6  # of the grid's longest side; as long a patch means that there are no two sides
+_CUT, _RING = 2, 6  # nodes around a patch that are taken out, and up to which the surface is looked at
+_PART = 0.25  # of that ring, what counts as a part of it
+
+
+def two_sided(
+    values: np.ndarray | Blocks,
+    band: NearBand,
+    crossings: Crossings,
+    surface: LocalSurface,
+    grid: Grid,
+    progress: Progress,
+) -> np.ndarray | Blocks | None:
+    """Signed distances within two cells of the surface, negative on one side of it, with every sheet continued past its
+    rims; None where the surface has no two sides.
+
+    values : (nx,ny,nz) float32 or Blocks, unsigned distances; the result is alike
+    """
+    votes = _votes(band, crossings, grid)
+    progress(0.1)
+    sample, height = _heights(band, surface, grid)
+    side = _sides_of_nodes(votes, sample, height, progress.part(0.2, 0.8))
+    if not _agree(votes.sure(), side, band, grid, progress.part(0.8, 1.0)):
+        return None
+    least = np.where(band.past_rim, _LEAST * grid.spacing, 0.0)
+    off = np.where(band.past_rim, np.abs(height), np.linalg.norm(band.step, axis=1))
+    signed = each(lambda u: np.full_like(u, _BEYOND * grid.spacing), values)
+    put(signed, band.node, (side * np.maximum(off, least)).astype(np.float32))
+    return signed
+
+
+@dataclass(frozen=True)
+class _Votes:
+    """Edges between nodes of the band, by their rows `low` and `high`, (e,), and what they say, (e,): -1 where the
+    surface crosses them, 1 where it does not, and half of that past its rims, where the sheet continued may cross."""
+
+    low: np.ndarray
+    high: np.ndarray
+    sign: np.ndarray
+
+    def sure(self) -> "_Votes":
+        """Those that are not past a rim."""
+        chosen = np.abs(self.sign) == 1
+        return _Votes(self.low[chosen], self.high[chosen], self.sign[chosen])
+
+    def matrix(self, n) -> csr_matrix:
+        return _symmetric(self.sign, self.low, self.high, n)
+
+
+def _votes(band, crossings, grid):
+    low, high, key = [], [], []
+    for axis, stride in enumerate(node_strides(grid.shape)):
+        row = band.rows(band.node + stride)
+        inside = np.flatnonzero(row >= 0)
+        low.append(inside)
+        high.append(row[inside])
+        key.append(3 * band.node[inside] + axis)
+    low, high, key = (np.concatenate(x) for x in (low, high, key))
+    crossed = np.isin(key, crossings.changing_sides())
+    past_rim = band.past_rim[low] | band.past_rim[high]
+    return _Votes(low, high, np.where(crossed, -1.0, np.where(past_rim, 0.5, 1.0)))
+
+
+def _heights(band, surface, grid):
+    """The sample that each node of the band goes with, (b,), the nearest of those that nodes off the rims go with, and
+    how far the node is off the surface to the side that the sample's normal shows, (b,); past rims, off its plane."""
+    x, sample, past = grid.positions(band.node), np.empty(len(band.node), np.int64), band.past_rim
+    sample[~past] = surface.tree.query(x[~past], workers=-1)[1]
+    seen = np.unique(sample[~past])
+    if len(seen):
+        sample[past] = seen[KDTree(surface.points[seen]).query(x[past], workers=-1)[1]]
+    step = np.where(past[:, None], x - surface.points[sample], band.step)
+    return sample, np.einsum("bi,bi->b", step, surface.normals[sample])
+
+
+def _sides_of_nodes(votes, sample, height, progress):
+    """Sides of the nodes of the band, (b,) of -1 and 1, from samples oriented alike, then swept over the nodes."""
+    of, number = np.unique(sample, return_inverse=True)
+    sure = votes.sure()
+    weight = sure.sign * height[sure.low] * height[sure.high]
+    low, high = number[sure.low], number[sure.high]
+    apart = low != high
+    links = _symmetric(weight[apart], low[apart], high[apart], len(of))
+    facing = _orientations(links, progress.part(0.0, 0.8))
+    side = np.sign(facing)[number] * height
+    side /= max(np.abs(side).max(initial=0.0), np.finfo(float).tiny)
+    matrix = votes.matrix(len(side))
+    degree = np.maximum(np.diff(matrix.indptr), 1)
+    for _ in progress.part(0.8, 1.0).each(range(_SWEEPS)):
+        side = 0.5 * (side + matrix @ np.sign(side) / degree)
+    return np.where(side < 0, -1.0, 1.0)
+
+
+def _orientations(links, progress):
+    """The vector (m,) that differs least along links of positive weight, and least from its negative along links of
+    negative weight, (m,m) sparse and symmetric; in each connected part."""
+    strength = abs(links)
+    degree = np.asarray(strength.sum(axis=1)).reshape(-1)
+    _, part = connected_components(strength, directed=False)
+    size = np.bincount(part)
+    facing = _along_tree(links, strength)
+    shift = _SHIFT * max(float(np.median(degree)), np.finfo(float).tiny)
+    matrix, scales = diags(degree + shift) - links, diags(1 / (degree + shift))
+    for number in range(_ITERATIONS):
+        looks = progress.part(number / _ITERATIONS, (number + 1) / _ITERATIONS).each(range(_STEPS))
+        before, look = facing > 0, lambda _, looks=looks: next(looks)
+        facing, _ = cg(matrix, shift * facing, x0=facing, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=look)
+        length = np.sqrt(np.bincount(part, facing**2) / size)
+        facing = np.clip(facing / np.maximum(length, np.finfo(float).tiny)[part], -1, 1)
+        if ((facing > 0) == before).all():
+            break
+    return facing
+
+
+def _along_tree(links, strength):
+    """Signs (m,) that agree with the strongest links that connect all, by a spanning tree in each connected part."""
+    m = links.shape[0]
+    order = strength.copy()
+    order.data = 2 * order.data.max(initial=0.0) - order.data
+    tree = minimum_spanning_tree(order)
+    parts, part = connected_components(tree, directed=False)
+    start = np.unique(part, return_index=True)[1]
+    tail, head = (np.append(end, start) for end in tree.nonzero())
+    head[len(head) - parts :] = m  # which stands before all
+    tree = coo_matrix((np.ones(2 * len(tail)), (np.append(tail, head), np.append(head, tail))), shape=(m + 1,) * 2)
+    visited, parent = breadth_first_order(tree.tocsr(), m, directed=False)
+    visited, parent = visited[1:], parent[visited[1:]]
+    inner, relation = parent < m, np.ones(m)
+    relation[inner] = np.sign(np.asarray(links[visited[inner], parent[inner]]).reshape(-1))
+    sign = np.ones(m + 1)
+    for row, before, same in zip(visited.tolist(), parent.tolist(), relation.tolist(), strict=True):
+        sign[row] = sign[before] * same
+    return sign[:m]
+
+
+def _agree(votes, side, band, grid, progress):
+    """Whether the votes that `side` overrules are of short patches that do not part the surface around them."""
+    overruled = votes.sign * side[votes.low] * side[votes.high] < 0
+    low, high = votes.low[overruled], votes.high[overruled]
+    middle = 0.5 * (grid.positions(band.node[low]) + grid.positions(band.node[high])) / grid.spacing
+    if not len(middle):
+        return True
+    pairs = KDTree(middle).query_pairs(_ADJACENT, output_type="ndarray")
+    patch = connected_components(_symmetric(np.ones(len(pairs)), *pairs.T, len(middle)), directed=False)[1]
+    graph = abs(votes.matrix(len(side)))
+    for number in progress.each(np.unique(patch)):
+        own = patch == number
+        length = np.linalg.norm(np.ptp(middle[own], axis=0))
+        if length > _LONG * max(grid.shape):
+            return False
+        if length > _SHORT and _parted(graph, np.append(low[own], high[own])):
+            return False
+    return True
+
+
+def _parted(graph, row):
+    """Whether the nodes around those of some rows are in several parts, once these and the next are taken out."""
+    reached = np.zeros(graph.shape[0], bool)
+    reached[row] = True
+    for step in range(_RING):
+        if step == _CUT:
+            cut = reached
+        reached = reached | (graph @ reached > 0)
+    ring = np.flatnonzero(reached & ~cut)
+    size = np.bincount(connected_components(graph[ring][:, ring], directed=False)[1], minlength=1)
+    return (size > _PART * len(ring)).sum() > 1
+
+
+def _symmetric(weight, low, high, n):
+    """Sparse (n,n) with the sum of the weights (e,) of each pair, either way."""
+    ends = np.append(low, high), np.append(high, low)
+    matrix = coo_matrix((np.append(weight, weight), ends), shape=(n, n)).tocsr()
+    matrix.eliminate_zeros()
+    return matrix

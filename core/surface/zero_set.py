@@ -1,0 +1,51 @@
+"""Where signed distances are zero, as vertices and faces, and creases of meshes that lie there."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..field.blocks import Blocks
+from ..field.grid import Grid
+from ..field.local_surface import LocalSurface
+from ..progress import Progress
+from .corners import into_corners
+from .evening import FLAT, vertex_normals
+from .isosurface import isosurface
+from .mesh import Mesh
+from .thin_parts import find_thin_parts
+
+_ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
+_INTO = 1.5  # cells, how far a vertex may go into a crease
+
+
+def zero_set(
+    values: np.ndarray | Blocks, surface: LocalSurface, grid: Grid, progress: Progress
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v,3) and quads or triangles (f,4) or (f,3) of the zero set of signed distances (nx,ny,nz) float32 or
+    Blocks, which may be changed: near parts that the signs of nodes do not show (see :mod:`.thin_parts`) they start off
+    the surface and are pulled in, as those of a double cover."""
+    if thin := find_thin_parts(values, surface, grid, progress.part(0.0, 0.5)):
+        thin.lower(values, grid)
+    cells, faces = isosurface(values, 0.0)
+    vertices = grid.origin + grid.spacing * cells
+    if thin:
+        lifted = np.flatnonzero(thin.lift(vertices))
+        vertices[lifted] -= surface.project(vertices[lifted], progress.part(0.5, 1.0)).step
+    return vertices, faces
+
+
+def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
+    """The mesh, whose vertices lie on the surface, with those next to creases taken into them: inward ones, then
+    outward ones, which are inward seen from inside."""
+    vertices = mesh.vertices
+    for turn, outward in enumerate((1.0, -1.0)):
+        part = progress.part(turn / 2, (turn + 1) / 2)
+        normal, least = vertex_normals(vertices, mesh.faces)
+        bent, side = np.flatnonzero(least < FLAT), np.zeros_like(vertices)
+        way = outward * normal[bent]
+        found = surface.project(vertices[bent] + _ASIDE * cell * way, part.part(0.0, 0.5))
+        direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
+        clear = back & (np.einsum("vi,vi->v", direction, way) > 0) & ~found.past_rim
+        side[bent[clear]] = direction[clear]
+        vertices = into_corners(vertices, mesh.faces, side, surface, cell, part.part(0.5, 1.0), _INTO)
+    return replace(mesh, vertices=vertices)
