@@ -32,6 +32,7 @@ _LEAST = 0.1  # cells, distance of nodes past a rim from the sheet continued, if
 _ADJACENT = 1.8  # cells, overruled votes of one patch
 _SHORT = 2.0  # cells, shorter patches do not count
 _LONG = 1 / 6  # of the grid's longest side; as long a patch means that there are no two sides
+_STRIP = 400  # crossings for each squared cell of length; a patch parts a strip no longer for its width than this
 _CUT, _RING = 2, 6  # nodes around a patch that are taken out, and up to which the surface is looked at
 _PART = 0.25  # of that ring, what counts as a part of it
 
@@ -176,12 +177,15 @@ def _agree(votes, side, band, grid, progress):
     pairs = KDTree(middle).query_pairs(_ADJACENT, output_type="ndarray")
     patch = connected_components(_symmetric(np.ones(len(pairs)), *pairs.T, len(middle)), directed=False)[1]
     graph = abs(votes.matrix(len(side)))
+    part = connected_components(graph, directed=False)[1]
+    crossed = np.bincount(part[votes.low], votes.sign < 0)
     for number in progress.each(np.unique(patch)):
         own = patch == number
         length = np.linalg.norm(np.ptp(middle[own], axis=0))
         if length > _LONG * max(grid.shape):
             return False
-        if length > _SHORT and _parted(graph, np.append(low[own], high[own])):
+        narrow = _STRIP * length**2 > crossed[part[low[own][0]]]
+        if length > _SHORT and narrow and _parted(graph, np.append(low[own], high[own])):
             return False
     return True
 

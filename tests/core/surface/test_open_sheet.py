@@ -6,6 +6,7 @@ from scipy.spatial import KDTree
 
 from core import Settings, reconstruct
 from core.errors import MissingDependency
+from core.io.points import read_points
 from core.surface.open_sheet import _apart
 from tests import shapes
 
@@ -46,6 +47,14 @@ def test_its_rim_is_where_the_samples_end():
     rim = sheet.vertices[np.unique(edges[counts == 1])] @ turn
     spacing = np.sqrt(20 / 8000)
     assert np.abs(rim[:, 2] - 1).max() < 1.5 * spacing
+
+
+def test_a_creased_scan_is_wound_alike():
+    """A bust, open below: of its dual contour 246 edges have three faces or more, and 293 cannot be wound alike."""
+    run = single(read_points("tests/data/bust.ply"), resolution=128, denoise="auto")
+    assert run.sheet.edge_counts()[1].max() == 2
+    assert run.report["warnings"] == []
+    assert KDTree(run.sheet.vertices).query(run.points)[0].max() < 2.5 * run.field.spacing
 
 
 def test_sheets_that_pass_through_each_other_askew_are_wound_alike():
