@@ -30,6 +30,7 @@ _ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 10, 300, 1e-3, 1e-3
 _SWEEPS = 12
 _LEAST = 0.1  # cells, distance of nodes past a rim from the sheet continued, if they are across a crossing
 _ADJACENT = 1.8  # cells, overruled votes of one patch
+_MOST = 0.02  # of the votes, more overruled ones mean that there are no two sides
 _SHORT = 2.0  # cells, shorter patches do not count
 _LONG = 1 / 6  # of the grid's longest side; as long a patch means that there are no two sides
 _STRIP = 400  # crossings for each squared cell of length; a patch parts a strip no longer for its width than this
@@ -100,9 +101,8 @@ def _heights(band, surface, grid):
     how far the node is off the surface to the side that the sample's normal shows, (b,); past rims, off its plane."""
     x, sample, past = grid.positions(band.node), np.empty(len(band.node), np.int64), band.past_rim
     sample[~past] = surface.tree.query(x[~past], workers=-1)[1]
-    seen = np.unique(sample[~past])
-    if len(seen):
-        sample[past] = seen[KDTree(surface.points[seen]).query(x[past], workers=-1)[1]]
+    seen = np.arange(surface.tree.n) if past.all() else np.unique(sample[~past])
+    sample[past] = seen[KDTree(surface.points[seen]).query(x[past], workers=-1)[1]]
     step = np.where(past[:, None], x - surface.points[sample], band.step)
     return sample, np.einsum("bi,bi->b", step, surface.normals[sample])
 
@@ -133,7 +133,7 @@ def _orientations(links, progress):
     _, part = connected_components(strength, directed=False)
     size = np.bincount(part)
     facing = _along_tree(links, strength)
-    shift = _SHIFT * max(float(np.median(degree)), np.finfo(float).tiny)
+    shift = _SHIFT * np.median(degree[degree > 0]) if links.nnz else 1.0
     matrix, scales = diags(degree + shift) - links, diags(1 / (degree + shift))
     for number in range(_ITERATIONS):
         looks = progress.part(number / _ITERATIONS, (number + 1) / _ITERATIONS).each(range(_STEPS))
@@ -168,26 +168,29 @@ def _along_tree(links, strength):
 
 
 def _agree(votes, side, band, grid, progress):
-    """Whether the votes that `side` overrules are of short patches that do not part the surface around them."""
+    """Whether the votes that `side` overrules are few, of short patches that do not part the surface around them."""
     overruled = votes.sign * side[votes.low] * side[votes.high] < 0
+    if not overruled.any():
+        return True
+    if overruled.mean() > _MOST:
+        return False
     low, high = votes.low[overruled], votes.high[overruled]
     middle = 0.5 * (grid.positions(band.node[low]) + grid.positions(band.node[high])) / grid.spacing
-    if not len(middle):
-        return True
     pairs = KDTree(middle).query_pairs(_ADJACENT, output_type="ndarray")
     patch = connected_components(_symmetric(np.ones(len(pairs)), *pairs.T, len(middle)), directed=False)[1]
+    order = np.argsort(patch, kind="stable")
+    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
+    extent = np.maximum.reduceat(middle[order], first) - np.minimum.reduceat(middle[order], first)
+    length = np.linalg.norm(extent, axis=1)
+    if length.max() > _LONG * max(grid.shape):
+        return False
+
     graph = abs(votes.matrix(len(side)))
     part = connected_components(graph, directed=False)[1]
-    crossed = np.bincount(part[votes.low], votes.sign < 0)
-    for number in progress.each(np.unique(patch)):
-        own = patch == number
-        length = np.linalg.norm(np.ptp(middle[own], axis=0))
-        if length > _LONG * max(grid.shape):
-            return False
-        narrow = _STRIP * length**2 > crossed[part[low[own][0]]]
-        if length > _SHORT and narrow and _parted(graph, np.append(low[own], high[own])):
-            return False
-    return True
+    crossed = np.bincount(part[votes.low], votes.sign < 0)[part[low[order[first]]]]
+    ends = np.split(np.stack([low, high], axis=1)[order], first[1:])
+    narrow = np.flatnonzero((length > _SHORT) & (_STRIP * length**2 > crossed))
+    return not any(_parted(graph, ends[number].reshape(-1)) for number in progress.each(narrow))
 
 
 def _parted(graph, row):
