@@ -57,7 +57,9 @@ def test_processor_time_is_what_a_run_takes_within_a_factor_of_two(samples, sett
     assert taken / 2 < estimated < 2 * taken
 
 
-def test_noise_costs():
+def test_noise_costs(monkeypatch):
+    """On a machine of one speed: the probe of two estimates may differ by a third on a busy one."""
+    monkeypatch.setattr("core.budget._probe", lambda: (0.004, 1.0))
     points = shapes.scattered_sphere(3000)
     grid, spacing = fit_grid(points, 64), local_spacing(points)
     clean, noisy = (estimate_cost(spacing, grid, noisy=noisy).cpu_seconds for noisy in (False, True))
