@@ -6,6 +6,7 @@ summed and solved here.
 """
 
 import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
 
 _DISTINCT = 1e-5  # below this the two largest eigenvalues are too close for the closed form
 
@@ -86,6 +87,12 @@ def lengths(a: np.ndarray) -> np.ndarray:
 def outer_sum(terms: np.ndarray) -> np.ndarray:
     """Sums of one term for each of three axes, (m,3,w) -> (m,w,w,w)."""
     return terms[:, 0, :, None, None] + terms[:, 1, None, :, None] + terms[:, 2, None, None, :]
+
+
+def symmetric(weight: np.ndarray, low: np.ndarray, high: np.ndarray, n: int) -> csr_matrix:
+    """Sparse (n,n) that links pairs, (e,) rows of either end, both ways; weights (e,) of one pair are summed."""
+    ends = np.append(low, high), np.append(high, low)
+    return coo_matrix((np.append(weight, weight), ends), shape=(n, n)).tocsr()
 
 
 def inner(a: np.ndarray, b: np.ndarray) -> float:

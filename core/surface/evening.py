@@ -1,9 +1,8 @@
 """Faces of a dual mesh made even: its vertices lie where the grid has them, close together here and far apart there."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
-from ..linalg import cross, lengths
+from ..linalg import cross, lengths, symmetric
 from .mesh import at_corners, edges_of
 
 _ROUNDS, _DAMPING = 5, 0.5
@@ -23,7 +22,7 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     free = ~fixed & (least >= FLAT)
     free[np.concatenate([tail[count != 2], head[count != 2]])] = False
     free = np.flatnonzero(free)
-    links = coo_matrix((np.ones(2 * len(tail)), (np.append(tail, head), np.append(head, tail))), shape=(n, n)).tocsr()
+    links = symmetric(np.ones(len(tail)), tail, head, n)
     links, normal, moved = links[free], normal[free], vertices.copy()
     links.data /= np.repeat(np.diff(links.indptr), np.diff(links.indptr))
     here = moved[free]

@@ -68,6 +68,21 @@ def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     return [np.stack([column.take(corner) for column in columns]) for corner in faces.T.astype(np.intp)]
 
 
+def edge_numbers(faces: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the edge from each corner to the next of triangles or quads (f,k) over n vertices, (f,k) int, and how
+    many faces each edge has, (e,) int; numbered as in :func:`edges_of`."""
+    tail, head = faces.astype(np.int64), np.roll(faces, -1, axis=1)
+    key = np.minimum(tail, head) * n + np.maximum(tail, head)
+    _, edge, count = np.unique(key.reshape(-1), return_inverse=True, return_counts=True)
+    return edge.reshape(faces.shape), count
+
+
+def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices (v,3) that faces (f,k) have, and the faces with their numbers."""
+    used, corners = np.unique(faces, return_inverse=True)
+    return vertices[used], corners.reshape(faces.shape)
+
+
 def edges_of(faces: np.ndarray, n: int) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Both ends, (e,) int64 each and the lower one first, of the edges of triangles or quads (f,k) over n vertices, in
     order, and how many faces each edge has, (e,) int."""

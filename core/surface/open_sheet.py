@@ -11,7 +11,7 @@ from ..field.steps import NearBand
 from ..progress import Progress
 from .evening import evened
 from .first_steps import first_steps
-from .mesh import Mesh
+from .mesh import Mesh, edge_numbers, in_use
 from .pieces import pieces_with_samples
 from .settling import settled
 from .triangles import mesh_of
@@ -30,7 +30,7 @@ def open_sheet(values: np.ndarray | Blocks, band: NearBand, surface: LocalSurfac
     vertices, faces = zero_set(values, surface, grid, progress.part(0.0, 0.2))
     node = grid.nearest_nodes(np.clip(vertices, grid.origin, grid.origin + cell * (np.array(grid.shape) - 1)))
     near = np.abs(at_nodes(values, node)) <= _NEAR * cell
-    vertices, faces = _of_faces(vertices, faces, near[faces].all(axis=1))
+    vertices, faces = in_use(vertices, faces[near[faces].all(axis=1)])
     vertices, faces = _trimmed(vertices, faces, band, surface, grid, progress.part(0.2, 0.4))
     vertices = evened(vertices, faces)
     step = surface.project(vertices, progress.part(0.4, 0.7)).step
@@ -55,21 +55,19 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
     total = np.stack([np.bincount(corner, x, len(vertices)) for x in at.T], axis=1)
     vertices = vertices.copy()
     vertices[rim] = total[rim] / share[rim, None]
-    return _apart(*_of_faces(vertices, faces, kept))
+    return _apart(*in_use(vertices, faces[kept]))
 
 
 def _apart(vertices, faces):
     """With a vertex for each of the sheets that have no more than it in common."""
-    low, high = np.sort([faces, np.roll(faces, -1, axis=1)], axis=0).reshape(2, -1)
-    edge = np.unique(low * len(vertices) + high, return_inverse=True)[1].reshape(-1)
-    sheet = _connected(edge.reshape(faces.shape))
+    sheet = _connected(edge_numbers(faces, len(vertices))[0])
     key, corners = np.unique(faces + len(vertices) * sheet[:, None], return_inverse=True)
     return vertices[key % len(vertices)], corners.reshape(faces.shape)
 
 
 def _connected_to(marked, faces):
     """Which faces (f,k) are marked, (f,) bool, or connected to one that is, (f,) bool."""
-    part = _connected(np.unique(faces, return_inverse=True)[1].reshape(faces.shape))
+    part = _connected(faces)
     return np.isin(part, part[marked])
 
 
@@ -80,9 +78,3 @@ def _connected(shared):
     n = count + shared.max(initial=-1) + 1
     graph = coo_matrix((np.ones(len(owner), bool), (owner, count + shared.reshape(-1))), shape=(n, n))
     return connected_components(graph, directed=False)[1][:count]
-
-
-def _of_faces(vertices, faces, kept):
-    """The faces marked in `kept`, (f,) bool, and the vertices that they have."""
-    used, corners = np.unique(faces[kept], return_inverse=True)
-    return vertices[used], corners.reshape(-1, faces.shape[1])

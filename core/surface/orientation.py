@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from .mesh import Mesh
+from .spreading import spread_signs
 
 
 def orient(mesh: Mesh) -> tuple[Mesh, int]:
@@ -28,25 +28,16 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     pair = first[count == 2]
     a, b, against = owner[pair], owner[pair + 1], forward[pair] == forward[pair + 1]
 
-    graph = coo_matrix((np.where(against, 2, 1), (a, b)), shape=(n, n)).tocsr()
-    patches, patch = connected_components(graph, directed=False)
-    starts = np.unique(patch, return_index=True)[1]
-    tail, head = np.concatenate([a, starts]), np.concatenate([b, np.full(patches, n)])  # face n stands before all
-    relation = np.where(np.concatenate([against, np.zeros(patches, bool)]), 2, 1)
-    graph = coo_matrix((relation, (tail, head)), shape=(n + 1, n + 1)).tocsr()
-    graph = graph.maximum(graph.T)
-    visited, parent = breadth_first_order(graph, n, directed=False)
-    visited, parent = visited[1:], parent[visited[1:]]
-    flips = np.asarray(graph[visited, parent]).reshape(-1) == 2
-    turned = np.zeros(n + 1, bool)
-    for face, before, flip in zip(visited.tolist(), parent.tolist(), flips.tolist(), strict=True):
-        turned[face] = turned[before] ^ flip
-    turned = turned[:n]
+    links = coo_matrix((np.where(against, 2, 1), (a, b)), shape=(n, n)).tocsr()
+    links = links.maximum(links.T)
+    links.data = np.where(links.data == 2, -1, 1)
+    sign, patch = spread_signs(links)
+    turned = sign < 0
 
     corners = mesh.vertices[mesh.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outwards = np.einsum("fi,fi->f", normal, corners.mean(axis=1) - mesh.vertices.mean(axis=0))
-    inwards = np.bincount(patch, np.where(turned, -outwards, outwards), patches) < 0
+    inwards = np.bincount(patch, np.where(turned, -outwards, outwards)) < 0
     turned ^= inwards[patch]
     halves = np.arange(2 * mesh.pairs).reshape(2, -1)
     whole = patch[halves[0]] == patch[halves[1]]

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from ..field.local_surface import LocalSurface
 from ..linalg import COMPONENTS, principal_axes
-from .mesh import Mesh
+from .mesh import Mesh, edge_numbers
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
 _LENGTH = 1.5  # smoothing length, local spacings
@@ -91,9 +91,8 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
 def _outward(vertices, faces):
     """Directions (v,3) out of the faces at their borders, zero elsewhere: sums over border edges, by their length."""
     tail, head, third = (np.roll(faces, -k, axis=1).reshape(-1).astype(np.int64) for k in range(3))
-    key = np.minimum(tail, head) * len(vertices) + np.maximum(tail, head)
-    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
-    border = count[edge.reshape(-1)] == 1
+    edge, count = edge_numbers(faces, len(vertices))
+    border = (count[edge] == 1).reshape(-1)
     tail, head, third = tail[border], head[border], third[border]
     along = vertices[head] - vertices[tail]
     squared = np.maximum(np.einsum("ei,ei->e", along, along), np.finfo(float).tiny)

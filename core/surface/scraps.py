@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
-from .mesh import Mesh
+from .mesh import Mesh, edge_numbers, in_use
 
 _SMALL = 32  # faces of a patch
 _PAST = 1.5  # cells, that a spur goes past the line
@@ -22,7 +22,7 @@ _ROUNDS = 4
 def without_scraps(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     """The mesh without spurs, and with one patch less in each pocket: of those that close it, the one farthest from the
     surface. Patches are connected across edges of two faces. No border is made where there was none."""
-    edge, counts = _edges(mesh)
+    edge, counts = edge_numbers(mesh.faces, len(mesh.vertices))
     if (counts <= 2).all():
         return mesh
     label = _patches(edge, counts)
@@ -43,16 +43,8 @@ def without_scraps(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     if kept.all():
         return mesh
     mesh = mesh.of_faces(kept)
-    used, faces = np.unique(mesh.faces, return_inverse=True)
-    return replace(mesh, vertices=mesh.vertices[used], faces=faces.reshape(-1, 3).astype(np.int32))
-
-
-def _edges(mesh):
-    """Number of the edge from each corner of each face to the next, (f,3), and how many faces each edge has, (e,)."""
-    tail, head = mesh.faces.astype(np.int64), np.roll(mesh.faces, -1, axis=1)
-    key = np.minimum(tail, head) * len(mesh.vertices) + np.maximum(tail, head)
-    _, edge, counts = np.unique(key.reshape(-1), return_inverse=True, return_counts=True)
-    return edge.reshape(-1, 3), counts
+    vertices, faces = in_use(mesh.vertices, mesh.faces)
+    return replace(mesh, vertices=vertices, faces=faces.astype(np.int32))
 
 
 def _patches(edge, counts):

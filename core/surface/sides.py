@@ -13,7 +13,7 @@ sides: a hollow ball is inside between its walls, and outside within.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import diags
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from ..field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
 from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
+from ..linalg import symmetric
 from ..progress import Progress
 from .crossings import Crossings
 
@@ -28,7 +29,7 @@ _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging leng
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
 _SPECK = 27  # nodes
 _TOLERANCE, _STEPS = 1e-3, 1000
-_ADJACENT = 1.8  # cells, crossings of one patch
+_ADJACENT = 1.8  # cells, edges of one patch
 _OPEN = 0.05  # share of crossings with one side at both ends that a closed shape may have
 _PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening that does not count
 
@@ -94,8 +95,7 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     differ = inside_a != at_nodes(inside, b)
     alike, spanned = crossed & ~differ, ~crossed & differ
     middle = 0.5 * (grid.positions(a) + grid.positions(b))
-    reach = _ADJACENT * grid.spacing
-    largest = max(_largest_patch(middle[alike], reach), _largest_patch(middle[spanned], reach))
+    largest = max(np.bincount(patches(middle[chosen], grid)).max(initial=0) for chosen in (alike, spanned))
     total = max(int(crossed.sum()), 1)
     return Sides(
         inside=inside,
@@ -134,7 +134,7 @@ def _sides(a, b, crossed, n, outside, progress):
     """The side of each of n clusters in [-1,1], from edges (a, b) between them; cluster `outside` is 1."""
     kept = a != b
     a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
-    links = coo_matrix((np.r_[weight, weight], (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
+    links = symmetric(weight, a, b, n)
     degree = np.bincount(np.r_[a, b], minlength=n).astype(float)
     free = np.flatnonzero(np.arange(n) != outside)
     matrix = (diags(degree) - links)[free][:, free]
@@ -158,10 +158,10 @@ def _without_specks(inside):
     return inside
 
 
-def _largest_patch(middle, reach):
-    """The most points (m,3) of which each is within `reach` of another."""
+def patches(middle: np.ndarray, grid: Grid) -> np.ndarray:
+    """Number of the patch of each edge of the grid, (m,), by their middles (m,3): those of one patch are next to each
+    other."""
     if not len(middle):
-        return 0
-    pairs = KDTree(middle).query_pairs(reach, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(middle),) * 2)
-    return int(np.bincount(connected_components(graph, directed=False)[1]).max())
+        return np.empty(0, np.int64)
+    pairs = KDTree(middle).query_pairs(_ADJACENT * grid.spacing, output_type="ndarray")
+    return connected_components(symmetric(np.ones(len(pairs), bool), *pairs.T, len(middle)), directed=False)[1]

@@ -36,11 +36,12 @@ def single_layer(
     progress = Progress.of(progress)
     if sides.complete:
         return signed_mesh(sides.sign(values), surface, grid, progress), 0
-    signed, unoriented = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.1)), 1
-    if signed is None or crossings.normal.any():
+    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.1))
+    by_crossings = signed is None or crossings.normal.any()
+    if by_crossings:
         contour = dual_contour(crossings, surface, grid, progress.part(0.1, 0.5))
         sheet, unoriented = orient(mended(contour, surface, grid.spacing))
-    if signed is not None and unoriented:
+    if not by_crossings or (signed is not None and unoriented):
         contour = open_sheet(signed, band, surface, grid, progress.part(0.5, 0.9))
         sheet, unoriented = orient(mended(contour, surface, grid.spacing))
     return centred(sheet), unoriented

@@ -13,8 +13,8 @@ form a patch as long as the sheet is wide, or one that parts the surface around 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags
-from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
 
@@ -22,14 +22,16 @@ from ..field.blocks import Blocks, each, put
 from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
+from ..linalg import symmetric
 from ..progress import Progress
 from .crossings import Crossings
+from .sides import patches
+from .spreading import spread_signs
 
 _BEYOND = 3.0  # cells, distance that nodes out of the band count as
 _ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 10, 300, 1e-3, 1e-3
 _SWEEPS = 12
-_LEAST = 0.1  # cells, distance of nodes past a rim from the sheet continued, if they are across a crossing
-_ADJACENT = 1.8  # cells, overruled votes of one patch
+_LEAST = 0.1  # cells, least distance of nodes past a rim from the sheet continued
 _MOST = 0.02  # of the votes, more overruled ones mean that there are no two sides
 _SHORT = 2.0  # cells, shorter patches do not count
 _LONG = 1 / 6  # of the grid's longest side; as long a patch means that there are no two sides
@@ -52,15 +54,16 @@ def two_sided(
     values : (nx,ny,nz) float32 or Blocks, unsigned distances; the result is alike
     """
     votes = _votes(band, crossings, grid)
+    sure = votes.sure()
     progress(0.1)
     sample, height = _heights(band, surface, grid)
-    side = _sides_of_nodes(votes, sample, height, progress.part(0.2, 0.8))
-    if not _agree(votes.sure(), side, band, grid, progress.part(0.8, 1.0)):
+    side = _sides_of_nodes(votes, sure, sample, height, progress.part(0.2, 0.8))
+    if not _agree(sure, side, band, grid, progress.part(0.8, 1.0)):
         return None
-    least = np.where(band.past_rim, _LEAST * grid.spacing, 0.0)
-    off = np.where(band.past_rim, np.abs(height), np.linalg.norm(band.step, axis=1))
+    continued = np.maximum(np.abs(height), _LEAST * grid.spacing)
+    off = np.where(band.past_rim, continued, np.linalg.norm(band.step, axis=1))
     signed = each(lambda u: np.full_like(u, _BEYOND * grid.spacing), values)
-    put(signed, band.node, (side * np.maximum(off, least)).astype(np.float32))
+    put(signed, band.node, (side * off).astype(np.float32))
     return signed
 
 
@@ -79,7 +82,7 @@ class _Votes:
         return _Votes(self.low[chosen], self.high[chosen], self.sign[chosen])
 
     def matrix(self, n) -> csr_matrix:
-        return _symmetric(self.sign, self.low, self.high, n)
+        return symmetric(self.sign, self.low, self.high, n)
 
 
 def _votes(band, crossings, grid):
@@ -107,14 +110,14 @@ def _heights(band, surface, grid):
     return sample, np.einsum("bi,bi->b", step, surface.normals[sample])
 
 
-def _sides_of_nodes(votes, sample, height, progress):
+def _sides_of_nodes(votes, sure, sample, height, progress):
     """Sides of the nodes of the band, (b,) of -1 and 1, from samples oriented alike, then swept over the nodes."""
     of, number = np.unique(sample, return_inverse=True)
-    sure = votes.sure()
     weight = sure.sign * height[sure.low] * height[sure.high]
     low, high = number[sure.low], number[sure.high]
     apart = low != high
-    links = _symmetric(weight[apart], low[apart], high[apart], len(of))
+    links = symmetric(weight[apart], low[apart], high[apart], len(of))
+    links.eliminate_zeros()
     facing = _orientations(links, progress.part(0.0, 0.8))
     side = np.sign(facing)[number] * height
     side /= max(np.abs(side).max(initial=0.0), np.finfo(float).tiny)
@@ -130,9 +133,8 @@ def _orientations(links, progress):
     negative weight, (m,m) sparse and symmetric; in each connected part."""
     strength = abs(links)
     degree = np.asarray(strength.sum(axis=1)).reshape(-1)
-    _, part = connected_components(strength, directed=False)
+    facing, part = _along_tree(links, strength)
     size = np.bincount(part)
-    facing = _along_tree(links, strength)
     shift = _SHIFT * np.median(degree[degree > 0]) if links.nnz else 1.0
     matrix, scales = diags(degree + shift) - links, diags(1 / (degree + shift))
     for number in range(_ITERATIONS):
@@ -147,24 +149,13 @@ def _orientations(links, progress):
 
 
 def _along_tree(links, strength):
-    """Signs (m,) that agree with the strongest links that connect all, by a spanning tree in each connected part."""
-    m = links.shape[0]
+    """Signs (m,) that agree with the strongest links that connect all, by a spanning tree in each connected part, and
+    the number of that part, (m,)."""
     order = strength.copy()
     order.data = 2 * order.data.max(initial=0.0) - order.data
-    tree = minimum_spanning_tree(order)
-    parts, part = connected_components(tree, directed=False)
-    start = np.unique(part, return_index=True)[1]
-    tail, head = (np.append(end, start) for end in tree.nonzero())
-    head[len(head) - parts :] = m  # which stands before all
-    tree = coo_matrix((np.ones(2 * len(tail)), (np.append(tail, head), np.append(head, tail))), shape=(m + 1,) * 2)
-    visited, parent = breadth_first_order(tree.tocsr(), m, directed=False)
-    visited, parent = visited[1:], parent[visited[1:]]
-    inner, relation = parent < m, np.ones(m)
-    relation[inner] = np.sign(np.asarray(links[visited[inner], parent[inner]]).reshape(-1))
-    sign = np.ones(m + 1)
-    for row, before, same in zip(visited.tolist(), parent.tolist(), relation.tolist(), strict=True):
-        sign[row] = sign[before] * same
-    return sign[:m]
+    tail, head = minimum_spanning_tree(order).nonzero()
+    relation = np.sign(np.asarray(links[tail, head]).reshape(-1))
+    return spread_signs(symmetric(relation, tail, head, links.shape[0]))
 
 
 def _agree(votes, side, band, grid, progress):
@@ -175,13 +166,12 @@ def _agree(votes, side, band, grid, progress):
     if overruled.mean() > _MOST:
         return False
     low, high = votes.low[overruled], votes.high[overruled]
-    middle = 0.5 * (grid.positions(band.node[low]) + grid.positions(band.node[high])) / grid.spacing
-    pairs = KDTree(middle).query_pairs(_ADJACENT, output_type="ndarray")
-    patch = connected_components(_symmetric(np.ones(len(pairs)), *pairs.T, len(middle)), directed=False)[1]
+    middle = 0.5 * (grid.positions(band.node[low]) + grid.positions(band.node[high]))
+    patch = patches(middle, grid)
     order = np.argsort(patch, kind="stable")
     first = np.flatnonzero(np.diff(patch[order], prepend=-1))
     extent = np.maximum.reduceat(middle[order], first) - np.minimum.reduceat(middle[order], first)
-    length = np.linalg.norm(extent, axis=1)
+    length = np.linalg.norm(extent, axis=1) / grid.spacing
     if length.max() > _LONG * max(grid.shape):
         return False
 
@@ -204,11 +194,3 @@ def _parted(graph, row):
     ring = np.flatnonzero(reached & ~cut)
     size = np.bincount(connected_components(graph[ring][:, ring], directed=False)[1], minlength=1)
     return (size > _PART * len(ring)).sum() > 1
-
-
-def _symmetric(weight, low, high, n):
-    """Sparse (n,n) with the sum of the weights (e,) of each pair, either way."""
-    ends = np.append(low, high), np.append(high, low)
-    matrix = coo_matrix((np.append(weight, weight), ends), shape=(n, n)).tocsr()
-    matrix.eliminate_zeros()
-    return matrix

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from core import Mesh
+from core.surface.mesh import edge_numbers, edges_of, in_use
 
 TETRAHEDRON = Mesh(
     np.concatenate([np.zeros((1, 3)), np.eye(3)]),
@@ -77,3 +78,19 @@ def test_quads_that_are_not_to_be_are_triangles():
     found = STRIP.of_faces(np.ones(5, bool), np.array([False, True]))
     assert found.quads.tolist() == [[1, 2, 5, 4]]
     assert found.triangles.tolist() == [[0, 1, 4], [0, 4, 3], [2, 6, 5]]
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_edge_numbers_are_those_of_the_edges(corners):
+    faces = np.array([np.random.default_rng(k).permutation(12)[:corners] for k in range(20)])
+    number, count = edge_numbers(faces, 12)
+    ends, counts = edges_of(faces, 12)
+    np.testing.assert_array_equal(count, counts)
+    along = np.sort([faces, np.roll(faces, -1, axis=1)], axis=0)
+    np.testing.assert_array_equal(np.stack(ends)[:, number], along)
+
+
+def test_vertices_out_of_use_are_left_out():
+    vertices, faces = in_use(np.arange(24.0).reshape(8, 3), np.array([[7, 1, 3], [3, 1, 4]]))
+    np.testing.assert_array_equal(vertices[:, 0], [3, 9, 12, 21])
+    np.testing.assert_array_equal(faces, [[3, 0, 1], [1, 0, 2]])

@@ -5,9 +5,10 @@ import pytest
 
 from core import Settings, reconstruct
 from core.field.blocks import Blocks
+from core.linalg import symmetric
 from core.progress import Progress
 from core.surface import single_layer
-from core.surface.two_sides import _orientations, _symmetric, two_sided
+from core.surface.two_sides import _orientations, two_sided
 from tests import shapes
 
 
@@ -121,7 +122,7 @@ def test_orientations_are_the_signs_of_the_first_eigenvector(wrong):
     same = (low // 60 == high // 60) & (low != high)
     low, high = low[same], high[same]
     sign = true[low] * true[high] * np.where(random.random(len(low)) < wrong, -1, 1)
-    links = _symmetric(sign * random.uniform(0.5, 1.5, len(low)), low, high, n)
+    links = symmetric(sign * random.uniform(0.5, 1.5, len(low)), low, high, n)
     found, dense = np.sign(_orientations(links, Progress())), links.toarray()
     laplacian = np.diag(np.abs(dense).sum(axis=1)) - dense
     for part in (slice(0, 60), slice(60, 120)):

@@ -1,0 +1,24 @@
+"""Signs handed on from neighbour to neighbour."""
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+
+
+def spread_signs(links: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
+    """Signs (n,) of -1 and 1 that symmetric links (n,n), 1 between two of one sign and -1 between two that differ, hand
+    on breadth-first from the first of each connected part, which has 1; and the number of that part, (n,)."""
+    n = links.shape[0]
+    parts, part = connected_components(links, directed=False)
+    tail, head = links.nonzero()
+    start, before_all = np.unique(part, return_index=True)[1], np.full(parts, n)
+    ends = np.concatenate([tail, start, before_all]), np.concatenate([head, before_all, start])
+    graph = coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(n + 1, n + 1)).tocsr()
+    visited, parent = breadth_first_order(graph, n, directed=False)
+    visited, parent = visited[1:], parent[visited[1:]]
+    inner, relation = parent < n, np.ones(n)
+    relation[inner] = np.asarray(links[visited[inner], parent[inner]]).reshape(-1)
+    sign = np.ones(n + 1)
+    for row, before, same in zip(visited.tolist(), parent.tolist(), relation.tolist(), strict=True):
+        sign[row] = sign[before] * same
+    return sign[:n], part
