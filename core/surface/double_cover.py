@@ -14,6 +14,7 @@ from .first_steps import first_steps
 from .isosurface import isosurface
 from .mesh import Mesh
 from .pieces import pieces_with_samples
+from .ridges import raise_ridges
 from .triangles import mesh_of
 
 CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made background
@@ -55,6 +56,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     progress = Progress.of(progress)
     level = np.float32(level_for(surface, grid, offset) * grid.spacing)
     clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)
+    raise_ridges(clamped, band, grid, level)
     progress(0.0)
     cells, faces = isosurface(clamped, level)
     vertices = grid.origin + grid.spacing * cells

@@ -1,0 +1,56 @@
+"""Gaps between sheets that run close, kept open wherever they are wide enough for an iso-surface.
+
+Midway between two sheets the distance has a ridge, and nodes on either side of it lie up to half a cell lower. So in a
+gap hardly wider than two levels an iso-surface goes on in places and stops in others, as the nodes happen to lie, and
+narrow wedges are closed a cell too early. Where the steps to two neighbouring nodes point at each other they tell how
+high the ridge is.
+"""
+
+import numpy as np
+
+from ..field.blocks import Blocks, at_nodes, put
+from ..field.grid import Grid, node_strides
+from ..field.steps import NearBand
+from ..linalg import dots
+from ..parallel import in_order
+
+_DIAGONAL = np.sqrt(2)  # cells: iso-surfaces may join nodes as far apart, at opposite corners of a face
+_FACING = -0.5  # largest cosine between the steps to both: wedges wider than 60 degrees need no help
+
+
+def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level: float) -> None:
+    """Give both ends of grid edges that cross a ridge of the distance its height, in place, where an iso-surface at
+    `level` then opens the gap and leaves the sheets whole.
+
+    That is where no two nodes lie across the diagonal of a face from each other that the iso-surface must not join: a
+    raised one and one behind its sheet, above the level as well; two that stay below it, on either sheet.
+
+    values : (nx,ny,nz) float32 or Blocks, distances at the nodes     level : float; both in the units of the samples
+    """
+    away = at_nodes(values, band.node).astype(np.float64)
+    toward = (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
+    off = _DIAGONAL * grid.spacing - level
+    least = max(level, off + 0.5 * _DIAGONAL * grid.spacing)
+    height = np.zeros(len(away))
+    for _, (ends, found) in in_order(lambda axis: _ridges(band, away, toward, grid, axis), range(3)):
+        for end in ends:
+            raised = (found > least) & (away[end] > off)
+            np.maximum.at(height, end[raised], found[raised])
+    row = np.flatnonzero(height > away)
+    put(values, band.node[row], height[row].astype(np.float32))
+
+
+def _ridges(band, away, toward, grid, axis):
+    """Rows in the band of both ends of the grid edges along `axis` with a ridge between, (2,e), and its height (e,):
+    where the planes through both feet are equally far."""
+    stride = node_strides(grid.shape)[axis]
+    inner = band.node // stride % grid.shape[axis] < grid.shape[axis] - 1
+    low = np.flatnonzero((toward[axis] > 0) & inner)
+    high = band.rows(band.node[low] + stride)
+    met = (high >= 0) & (toward[axis].take(high) < 0)
+    low, high = low[met], high[met]
+    facing = dots(toward[:, low], toward[:, high]) < _FACING
+    low, high = low[facing], high[facing]
+    rise, fall, cell = toward[axis, low], -toward[axis, high], grid.spacing
+    along = np.clip((away[high] - away[low] + cell * fall) / (rise + fall), 0, cell)
+    return np.stack([low, high]), away[low] + along * rise
