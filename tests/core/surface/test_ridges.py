@@ -56,9 +56,10 @@ def test_ridges_too_low_for_the_level_stay():
 
 def test_wide_wedges_stay():
     """Two half-planes at a right angle, as inside a cube."""
-    at = GRID.positions(NODE) + 0.04
+    frame = shapes.random_rotation(0)
+    at = GRID.positions(NODE) @ frame
     wall = np.abs(at[:, :2]).argmin(axis=1)
-    step = np.where(np.arange(3) == wall[:, None], at, 0.0)
+    step = np.where(np.arange(3) == wall[:, None], at, 0.0) @ frame.T
     inside = (at[:, :2] > 0).all(axis=1)
     before = np.linalg.norm(step, axis=1).reshape(GRID.shape).astype(np.float32)
     values = before.copy()
