@@ -50,6 +50,8 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     away from the surface on either side; an open sheet gives one piece, a closed one an outer and an inner piece.
     Flattened against the surface, rims have thin triangles.
 
+    Gaps between sheets, and wedges, are open down to little more than two levels, see :mod:`ridges`.
+
     Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
     """

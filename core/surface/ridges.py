@@ -7,6 +7,7 @@ high the ridge is.
 """
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, at_nodes, put
 from ..field.grid import Grid, node_strides
@@ -16,6 +17,8 @@ from ..parallel import in_order
 
 _DIAGONAL = np.sqrt(2)  # cells: iso-surfaces may join nodes as far apart, at opposite corners of a face
 _FACING = -0.5  # largest cosine between the steps to both: wedges wider than 60 degrees need no help
+_FEW, _AROUND = 9, 2.0  # nodes, cells: ridges this close are taken to be as high as they are on average
+_OWN = 0.75  # of the height that a ridge must have, at a node itself: it is lower where a sheet has a crack
 
 
 def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level: float) -> None:
@@ -29,15 +32,25 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
     """
     away = at_nodes(values, band.node).astype(np.float64)
     toward = (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
-    off = _DIAGONAL * grid.spacing - level
-    least = max(level, off + 0.5 * _DIAGONAL * grid.spacing)
     height = np.zeros(len(away))
     for _, (ends, found) in in_order(lambda axis: _ridges(band, away, toward, grid, axis), range(3)):
         for end in ends:
-            raised = (found > least) & (away[end] > off)
-            np.maximum.at(height, end[raised], found[raised])
-    row = np.flatnonzero(height > away)
-    put(values, band.node[row], height[row].astype(np.float32))
+            np.maximum.at(height, end, found)
+    row = np.flatnonzero(height)
+    own, typical = height[row], _averaged(height[row], grid.positions(band.node[row]), _AROUND * grid.spacing)
+    off = _DIAGONAL * grid.spacing - level
+    least = max(level, off + 0.5 * _DIAGONAL * grid.spacing)
+    raised = (typical > np.maximum(least, away[row])) & (own > _OWN * least) & (away[row] > off)
+    put(values, band.node[row[raised]], typical[raised].astype(np.float32))
+
+
+def _averaged(height, place, reach):
+    """Heights (m,) at places (m,3), averaged over the nearest few within reach: where those of single nodes decide,
+    pillars are left in the gap."""
+    if not len(height):
+        return height
+    away, near = KDTree(place).query(place, k=_FEW, distance_upper_bound=reach, workers=-1)
+    return np.mean(height.take(near, mode="clip"), axis=1, where=np.isfinite(away))
 
 
 def _ridges(band, away, toward, grid, axis):

@@ -54,6 +54,29 @@ def test_ridges_too_low_for_the_level_stay():
         np.testing.assert_array_equal(values, before)
 
 
+def test_errors_of_single_nodes_leave_no_pillars():
+    band, before = between_planes(2.6)
+    noise = np.random.default_rng(0).uniform(-0.25, 0.25, GRID.shape) * GRID.spacing
+    values = np.maximum(before + noise, 0).astype(np.float32)
+    safe = ends_of_crossing_edges() & (before > 0.7 * GRID.spacing)
+    raise_ridges(values, band, GRID, GRID.spacing)
+    assert (values[safe] > GRID.spacing).all()
+
+
+def test_a_node_in_a_crack_stays():
+    """As close to a sheet, and seen from it as much aslant, as none around it."""
+    band, before = between_planes(2.6)
+    at = (GRID.positions(band.node) @ TILTED + 0.04) / GRID.spacing
+    below = np.flatnonzero((at > -0.8) & (at < -0.5))  # whose one neighbour above the ridge is the next along x
+    middle = below[np.linalg.norm(GRID.positions(band.node[below]), axis=1).argmin()]
+    aslant = 0.46 * GRID.spacing * np.array([0.3, 0.85, 0.43])
+    values, step = before.copy(), band.step.copy()
+    values.flat[band.node[middle]], step[middle] = np.linalg.norm(aslant), aslant
+    raise_ridges(values, NearBand(band.node, step, band.past_rim), GRID, GRID.spacing)
+    assert values.flat[band.node[middle]] < 0.5 * GRID.spacing
+    assert (values.flat[band.node[below[below != middle]]] > GRID.spacing).all()
+
+
 def test_wide_wedges_stay():
     """Two half-planes at a right angle, as inside a cube."""
     frame = shapes.random_rotation(0)
