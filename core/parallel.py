@@ -1,11 +1,13 @@
 """Work on independent chunks by all cores, with results in order."""
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from itertools import islice
 
-_AHEAD = 2  # chunks in work or waiting, per core
+_AHEAD = 2  # chunks in work or waiting for it, per core
+_HELD = 16  # chunks begun and not yet handed on, per core: those behind a large one go on meanwhile
 
 
 def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
@@ -14,14 +16,19 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
     Threads serve, since NumPy and SciPy let go of the interpreter in their loops. What an iterator of `chunks` does
     (report progress, cancel) happens in the caller's thread; when it raises, no thread is left.
     """
-    cores = os.cpu_count() or 1
-    chunks = iter(chunks)
+    cores, chunks, begun = os.cpu_count() or 1, iter(chunks), deque()
     with ThreadPoolExecutor(cores) as pool:
         try:
-            waiting = [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, cores * _AHEAD)]
-            while waiting:
-                chunk, result = waiting.pop(0)
-                yield chunk, result.result()
-                waiting += [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, 1)]
+            while True:
+                busy = [result for _, result in begun if not result.done()]
+                fresh = min(cores * _AHEAD - len(busy), cores * _HELD - len(begun))
+                begun += [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, fresh)]
+                if not begun:
+                    return
+                if begun[0][1].done():
+                    chunk, result = begun.popleft()
+                    yield chunk, result.result()
+                else:
+                    wait([result for _, result in begun if not result.done()], return_when=FIRST_COMPLETED)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
