@@ -38,8 +38,8 @@ programs that ask for meshes that do not cross themselves refuse the double cove
 Blender with a Solidify modifier where it is to be solid.
 
 *Gap*: how far the layer behind lies from points of the other, percentiles in cells; negative where it lies in front.
-*Crossed*: share of the points where it does. *Apart*: the same mesh with each vertex moved outwards along its normal
-until no vertex and no middle of an edge of one layer is behind the other. It would cost what the last columns say: CD
+*Crossed*: share of the points where it does. *Apart*: the same mesh with each vertex moved outwards along its normal by
+what vertices and middles of edges there need to clear the other layer. It would cost what the last columns say: CD
 times 1000, in the scale of the case. Both layers would have to lie outside of the chords that they share now, so the
 error of the chords is twice as large; on points denser than the cells that error is all there is.
 
@@ -94,7 +94,8 @@ def gaps(mesh: Mesh, cell: float, seed: int = 0) -> np.ndarray:
 
 
 def laid_apart(mesh: Mesh, cell: float) -> Mesh:
-    """The mesh with vertices moved outwards so that no vertex or middle of an edge of one layer is behind the other."""
+    """The mesh with vertices moved outwards, once, by what vertices and middles of edges there need to clear the other
+    layer: half on either."""
     (low, high), vertices = mesh.edge_counts()[0].T, mesh.vertices
     normal, _ = vertex_normals(vertices, mesh.faces)
     place = np.concatenate([vertices, 0.5 * (vertices[low] + vertices[high])])
