@@ -28,6 +28,14 @@ class NearBand:
         row = np.minimum(np.searchsorted(self.node, node), len(self.node) - 1)
         return np.where(self.node[row] == node, row, -1)
 
+    def edges(self, axis: int, shape: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """Where the lower and the higher ends of the edges along `axis` of a grid of `shape` stand in the band, (e,)
+        int64 each, of those with both ends in it."""
+        stride = node_strides(shape)[axis]
+        row = self.rows(self.node + stride)
+        low = np.flatnonzero((row >= 0) & (self.node // stride % shape[axis] < shape[axis] - 1))
+        return low, row[low]
+
     def between(
         self, cells: np.ndarray, shape: tuple[int, int, int], spacing: float, off_rims: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:

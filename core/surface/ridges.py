@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, at_nodes, put
-from ..field.grid import Grid, node_strides
+from ..field.grid import Grid
 from ..field.steps import NearBand
 from ..linalg import dots
 from ..parallel import in_order
@@ -56,11 +56,8 @@ def _averaged(height, place, reach):
 def _ridges(band, away, toward, grid, axis):
     """Rows in the band of both ends of the grid edges along `axis` with a ridge between, (2,e), and its height (e,):
     where the planes through both feet are equally far."""
-    stride = node_strides(grid.shape)[axis]
-    inner = band.node // stride % grid.shape[axis] < grid.shape[axis] - 1
-    low = np.flatnonzero((toward[axis] > 0) & inner)
-    high = band.rows(band.node[low] + stride)
-    met = (high >= 0) & (toward[axis].take(high) < 0)
+    low, high = band.edges(axis, grid.shape)
+    met = (toward[axis, low] > 0) & (toward[axis, high] < 0)
     low, high = low[met], high[met]
     facing = dots(toward[:, low], toward[:, high]) < _FACING
     low, high = low[facing], high[facing]

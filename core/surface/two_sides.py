@@ -19,7 +19,7 @@ from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, each, put
-from ..field.grid import Grid, node_strides
+from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import symmetric
@@ -86,14 +86,9 @@ class _Votes:
 
 
 def _votes(band, crossings, grid):
-    low, high, key = [], [], []
-    for axis, stride in enumerate(node_strides(grid.shape)):
-        row = band.rows(band.node + stride)
-        inside = np.flatnonzero(row >= 0)
-        low.append(inside)
-        high.append(row[inside])
-        key.append(3 * band.node[inside] + axis)
-    low, high, key = (np.concatenate(x) for x in (low, high, key))
+    edges = [band.edges(axis, grid.shape) for axis in range(3)]
+    key = np.concatenate([3 * band.node[low] + axis for axis, (low, _) in enumerate(edges)])
+    low, high = np.concatenate(edges, axis=1)
     crossed = np.isin(key, crossings.changing_sides())
     past_rim = band.past_rim[low] | band.past_rim[high]
     return _Votes(low, high, np.where(crossed, -1.0, np.where(past_rim, 0.5, 1.0)))

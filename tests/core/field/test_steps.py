@@ -79,6 +79,19 @@ def test_no_sheet_appears_midway_between_two(gap):
     assert np.abs(distance - true[row]).max() < 0.5
 
 
+def test_edges_have_both_ends_in_the_band_and_end_at_the_sides_of_the_box():
+    shape, marked = (4, 5, 6), np.random.default_rng(0).random((4, 5, 6)) < 0.6
+    node = np.flatnonzero(marked)
+    band = NearBand(node, np.zeros((len(node), 3)), np.zeros(len(node), bool))
+    for axis in range(3):
+        expected = np.moveaxis(marked, axis, 0)[:-1] & np.moveaxis(marked, axis, 0)[1:]
+        at = np.argwhere(np.moveaxis(np.insert(expected, len(expected), False, axis=0), 0, axis))
+        low, high = (np.ravel_multi_index(tuple((at + step).T), shape) for step in (0, np.eye(3, dtype=int)[axis]))
+        found = band.edges(axis, shape)
+        np.testing.assert_array_equal(node[found[0]], low)
+        np.testing.assert_array_equal(node[found[1]], high)
+
+
 def test_positions_away_from_the_band_are_left_out():
     row, _ = distances(band(onto_plane((0, 0, 1), 5.0)), positions())
     assert len(row)
