@@ -12,6 +12,7 @@ from .corners import into_corners
 from .evening import evened
 from .first_steps import first_steps
 from .isosurface import isosurface
+from .layers import laid_apart
 from .mesh import Mesh
 from .pieces import pieces_with_samples
 from .ridges import raise_ridges
@@ -22,6 +23,7 @@ _SPARSE = 3.0  # cells, median local spacing above which the iso-surface is take
 _RAISED = 0.5  # cells further for each cell of it above that
 _WITHIN = 0.75  # of the box's padding, at most
 _LONGEST_STEP = 2.0  # levels
+_DENSE = 2 / 3  # cells, median local spacing
 
 
 def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
@@ -44,11 +46,16 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     band   : the nodes near the surface
 
     The idea of shrinking a double cover is DCUDF's (Hou et al., ACM TOG 42(6), 2023); here every vertex goes straight
-    to its foot point on the local surface, twice, with its faces made even in between, then drawn into concave corners
-    and put astride the surface, instead of descending a mesh energy. The first time, the steps to the nodes around it
-    tell the way, where they can. The mesh is closed and each of its edges has two faces, wound so that normals point
-    away from the surface on either side; an open sheet gives one piece, a closed one an outer and an inner piece.
-    Flattened against the surface, rims have thin triangles.
+    to its foot point on the local surface, twice, with its faces made even in between, then drawn into concave corners,
+    instead of descending a mesh energy. The first time, the steps to the nodes around it tell the way, where they can.
+    The mesh is closed and each of its edges has two faces, wound so that normals point away from the surface on either
+    side; an open sheet gives one piece, a closed one an outer and an inner piece. Flattened against the surface, rims
+    have thin triangles.
+
+    At last each layer is taken to its own side of the surface, see :mod:`layers`, which adds as much error again as
+    faces have that are chords of a curved surface. On samples denser than two thirds of a cell that is most of what
+    error there is; there faces are put astride the surface instead, and the layers pass through each other by
+    thousandths of a cell.
 
     Gaps between sheets, and wedges, are open down to little more than two levels, see :mod:`ridges`.
 
@@ -67,7 +74,9 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = evened(_moved(vertices, step, level), faces, past_rim)
     vertices = _moved(vertices, surface.project(vertices, progress.part(0.3, 0.7)).step, level)
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
-    mesh = centred(mesh_of(vertices, faces))
+    mesh = mesh_of(vertices, faces)
+    dense = np.median(surface.spacing) < _DENSE * grid.spacing
+    mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing)
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
 

@@ -1,0 +1,78 @@
+"""The two layers of a double cover laid apart, so that they do not pass through each other.
+
+Both are pulled onto the surface, and where it bends the triangles of either are other chords of it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..linalg import cross, dots, lengths
+from ..parallel import in_order
+from .centring import Bend, bend_of
+from .mesh import Mesh, at_corners
+
+_HAIR = 3e-4  # cells, between the layers
+_SHIFT = 0.5  # cells, by which layers are held apart in looking for faces of the other
+_NEAREST = 8  # faces that are tried
+_REACH = 0.75  # cells, farther sheets are others
+_OPPOSITE = -0.5  # largest cosine between the normals of either layer
+_CHUNK = 1 << 12  # places
+
+
+def laid_apart(mesh: Mesh, cell: float) -> Mesh:
+    """The mesh, whose vertices lie on the surface, with layers that are wound away from each other laid apart.
+
+    Vertices move outwards along their normals, by as much as the faces around them dip below the surface: so each layer
+    stays on its own side of the surface, however the triangles of the other lie. Where the mesh bends within a face or
+    two, at creases, rims and thin parts, that cannot be told from the normals, and most of it would be for nothing;
+    there both layers move by half of what vertices and middles of edges lack to clear the other one.
+
+    cell : length of one, in the units of the mesh
+    """
+    bend, dip = bend_of(mesh), np.zeros(len(mesh.vertices))
+    np.maximum.at(dip, mesh.faces.reshape(-1), np.repeat(np.maximum(bend.at_centroids(), bend.at_edges()), 3))
+    return _cleared(bend.moved(mesh, dip + _HAIR * cell), bend, cell)
+
+
+def _cleared(mesh: Mesh, bend: Bend, cell: float) -> Mesh:
+    beside = np.zeros(len(mesh.vertices), bool)
+    beside[mesh.faces[bend.sharp[mesh.faces].any(axis=1)]] = True
+    ends = np.concatenate([np.tile(np.flatnonzero(beside)[:, None], 2), bend.edges[beside[bend.edges].all(axis=1)]]).T
+    place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
+    behind, face = _other_layer(mesh, place, outward, cell)
+    lack = 0.5 * np.maximum(_HAIR * cell - behind, 0.0)
+    step = np.zeros(len(mesh.vertices))
+    for corner in (*ends, *mesh.faces[face].T):
+        np.maximum.at(step, corner, lack)
+    return replace(mesh, vertices=mesh.vertices + step[:, None] * bend.normal)
+
+
+def _other_layer(mesh, place, outward, cell):
+    """Along the lines through places (m,3), how far behind them the nearest face of the other layer lies, (m,) float64,
+    inf where there is none within reach, and which it is, (m,)."""
+    corners = at_corners(mesh.vertices, mesh.faces)
+    normal = cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    held = sum(corners) / 3 - _SHIFT * cell * normal
+    tree = KDTree(held.T, balanced_tree=False, compact_nodes=False)
+    behind, which = np.full(len(place), np.inf), np.zeros(len(place), np.intp)
+
+    def look(part):
+        at, way = place[part].T, outward[part].T
+        face = tree.query((at + _SHIFT * cell * way).T, k=range(1, 1 + min(_NEAREST, tree.n)))[1].T
+        other = normal.take(face, axis=1)
+        along = dots(other, way[:, None])
+        a, b, c = (corner.take(face, axis=1) - at[:, None] for corner in corners)
+        turns = [dots(cross(p, q), way[:, None]) for p, q in ((a, b), (b, c), (c, a))]
+        depth = -dots(a, other) / np.minimum(along, _OPPOSITE)  # of others, it does not count
+        hit = (np.max(turns, axis=0) <= 0) & (along < _OPPOSITE) & (np.abs(depth) < _REACH * cell)
+        nearest = np.where(hit, np.abs(depth), np.inf).argmin(axis=0), np.arange(face.shape[1])
+        which[part] = face[nearest]
+        behind[part] = np.where(hit[nearest], depth[nearest], np.inf)
+
+    for _ in in_order(look, [slice(first, first + _CHUNK) for first in range(0, len(place), _CHUNK)]):
+        pass
+    return behind, which
