@@ -77,6 +77,16 @@ def test_a_node_in_a_crack_stays():
     assert (values.flat[band.node[below[below != middle]]] > GRID.spacing).all()
 
 
+def test_a_ridge_of_a_few_nodes_stays():
+    """That over a crack in one sheet, for instance."""
+    band, before = between_planes(2.6)
+    near = np.linalg.norm(GRID.positions(band.node), axis=1) < 1.2 * GRID.spacing
+    values = before.copy()
+    raise_ridges(values, NearBand(band.node[near], band.step[near], band.past_rim[near]), GRID, GRID.spacing)
+    np.testing.assert_array_equal(values, before)
+    assert near.sum() > 4
+
+
 def test_wide_wedges_stay():
     """Two half-planes at a right angle, as inside a cube."""
     frame = shapes.random_rotation(0)
