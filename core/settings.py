@@ -6,10 +6,12 @@ The command line, the Blender panel and the README's table are generated from :c
 import dataclasses
 import numbers
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
 from .errors import SettingsError
+from .field.grid import PADDING
 
 WHOLE_BOX = 512  # cells, the finest resolution without a band
 BESIDE_OFFSET = 2  # cells that a band reaches beyond the offset, at least
@@ -150,6 +152,13 @@ class Settings:
             raise SettingsError(
                 f"band is {self.band:g} and offset {self.offset:g}; use a band of {self.offset + BESIDE_OFFSET:g} or "
                 "more, or lower the offset"
+            )
+        room = PADDING / (1 + 2 * PADDING)
+        if self.offset > room * self.resolution and self.surface not in ("none", "signed"):
+            raise SettingsError(
+                f"offset is {self.offset:g} and resolution {self.resolution}, which leaves {room * self.resolution:g} "
+                f"cells around the points; use an offset of {room * self.resolution:g} or less, or a resolution of "
+                f"{ceil(self.offset / room)} or more"
             )
         if self.diffusion == "grid" and self.integration != "poisson":
             raise SettingsError(

@@ -149,7 +149,7 @@ def _along_tree(links, strength):
     order = strength.copy()
     order.data = 2 * order.data.max(initial=0.0) - order.data
     tail, head = minimum_spanning_tree(order).nonzero()
-    relation = np.sign(np.asarray(links[tail, head]).reshape(-1))
+    relation = np.sign(np.asarray(links[tail, head]).reshape(-1)) if len(tail) else np.empty(0)
     return spread_signs(symmetric(relation, tail, head, links.shape[0]))
 
 

@@ -95,6 +95,7 @@ def test_no_band_is_none_by_either_name(word):
         ({"resolution": 513}, "set band"),
         ({"band": 4, "integration": "poisson"}, "integration='transport'"),
         ({"band": 4, "offset": 2.5}, "band of 4.5 or more"),
+        ({"resolution": 16, "offset": 2}, r"offset of 1\.6 or less, or a resolution of 20 or more"),
     ],
 )
 def test_settings_that_do_not_go_together_are_refused_with_the_remedy(unfit, remedy):

@@ -99,6 +99,12 @@ def test_one_sided_surfaces_and_junctions_have_none(asked, name):
     assert asked(points, resolution=64)["signed"] is None
 
 
+def test_samples_that_no_votes_link_are_taken(asked):
+    """A line and a sample beside it, which a coarse grid hardly shows."""
+    seen = asked(np.concatenate([np.arange(200.0)[:, None] * [1, 0, 0], [[0, 1, 0]]]), resolution=32)
+    assert seen["signed"] is None or np.isfinite(seen["signed"]).all()
+
+
 def test_wrong_votes_are_overruled(asked):
     """Of the crossings of a bowl 3 %, at random, are taken for none."""
     seen = asked(bowl())
