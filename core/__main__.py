@@ -1,8 +1,18 @@
 """`python -m core`."""
 
+import os
 import sys
 
-from .cli import main
+from .cli import BAD_INPUT, main
 
-sys.stdout.reconfigure(errors="backslashreplace")  # file names need not be text
-sys.exit(main())
+if sys.stdout is not None:
+    sys.stdout.reconfigure(errors="backslashreplace")  # file names need not be text
+try:
+    status = main()
+    if sys.stdout is not None:
+        sys.stdout.flush()
+except OSError as error:  # what is printed goes to a full disk, or nobody reads it; all files are written by then
+    sys.stderr.write(f"error: standard output cannot be written to ({error.strerror}); check where it goes\n")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    status = BAD_INPUT
+sys.exit(status)

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +80,7 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     least = options()["resolution"].metadata["limits"][0]
     area, coarser = float(np.sum((spacing / grid.spacing) ** 2)), range(settings.resolution - 1, least - 1, -1)
     if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
-        band = ", set band to 4" if settings.band is None and settings.integration == "transport" else ""
+        band = ", set band to 4" if _fits_in_band(len(spacing), area, limit, settings) else ""
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
     else:
         fitting = max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))
@@ -114,6 +114,12 @@ def _memory_at(resolution, samples, area, grid, settings):
     ratio = resolution / settings.resolution
     nodes = float(np.prod(np.ceil((np.array(grid.shape) - 1) * ratio) + 2))
     return _memory(samples, area * ratio**2, nodes, settings)
+
+
+def _fits_in_band(samples, area, limit, settings):
+    if settings.band is not None or settings.integration != "transport":
+        return False
+    return _memory(samples, area, 0, replace(settings, band=4.0)) <= limit
 
 
 def _probe():

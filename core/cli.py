@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from .budget import estimate_cost
 from .cleaning.noise import looks_noisy
-from .errors import Cancelled, MemoryBudgetError, MissingDependency, SettingsError, VADError
+from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .field.grid import fit_grid
 from .io.atomic import writable_folder
 from .io.npz import write_arrays
@@ -29,6 +29,7 @@ from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
 
 PROGRAM = "python -m core"
+_ENDINGS = "_points.ply", ".vdb", "_signed.ply", "_double.ply", "_single.ply", ".npz", ".json"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
 DONE, BAD_INPUT, TOO_LARGE, CANCELLED = 0, 2, 3, 130
 
@@ -164,12 +165,21 @@ def _reconstruct(given):
     settings = Settings(**{name: getattr(given, name) for name in options()})
     points, carried = read_scan(given.scan)
     folder = writable_folder(given.output)
+    _spare(given.scan, folder, given.arrays)
     with _progress() as progress:
         result = reconstruct(points, settings, progress=progress)
     report = _write(result, carried, folder, given.scan, given.gradient, given.arrays)
     for warning in report["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
     print(report_json(report) if given.json else _summary(report))
+
+
+def _spare(scan, folder, arrays):
+    """Raise :class:`InputError` where a file that is to be written is the scan itself."""
+    for ending in _ENDINGS if arrays else set(_ENDINGS) - {".npz"}:
+        path = folder / f"{scan.stem}{ending}"
+        if path.exists() and path.samefile(scan):
+            raise InputError(f"{path} would replace the scan, which is that file; give another folder for the results")
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from .surface.extract import Surfaces, band_for, extract_surfaces
 from .surface.pieces import piece_count
 from .surface.quality import quad_quality, triangle_quality
 
+_COARSE = 0.1  # cells, median local spacing below which a warning says that the grid is too coarse for the points
 _FACTS = (
     lambda mesh: {"borders": mesh.border_loops()},
     lambda mesh: {"pieces": piece_count(mesh)},
@@ -115,7 +116,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "seconds": stages.seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": [*samples.warnings, *ignored, *large, *surfaces.warnings],
+        "warnings": [*samples.warnings, *ignored, *large, *_too_coarse(spacing, grid), *surfaces.warnings],
     }
     progress(1.0)
     return Reconstruction(
@@ -127,6 +128,16 @@ def _reconstruct(points, settings, constraints, normals, progress):
         surface=surfaces.meshes.get("double", surfaces.meshes.get("signed")),
         sheet=surfaces.meshes.get("single"),
         report=report,
+    )
+
+
+def _too_coarse(spacing, grid):
+    cells = float(np.median(spacing)) / grid.spacing
+    if cells >= _COARSE:
+        return ()
+    return (
+        f"points lie {cells:.2g} cells apart, and what they show within a cell is lost; raise the resolution, beyond "
+        "512 with a band, or reconstruct parts that lie far from each other one by one",
     )
 
 

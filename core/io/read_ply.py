@@ -10,6 +10,7 @@ from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 from ..errors import InputError
 
 _FIRST_LINE = re.compile(rb"ply(\r\n|\n|\r)")
+_COMMENT = re.compile(rb"^[ \t]*(comment|obj_info)\b.*\n", re.MULTILINE)
 _ELEMENT = re.compile(rb"^([ \t]*element[ \t]+\S+)[ \t]+(-?\d+)[ \t]*$", re.MULTILINE)
 
 
@@ -56,7 +57,8 @@ def _read(content):
 def _header(content):
     """What the header declares (elements without rows), their row counts, and where the data start.
 
-    plyfile reads the header with every count set to zero, so that nothing is allocated before the counts are checked.
+    plyfile reads the header with every count set to zero, so that nothing is allocated before the counts are checked,
+    and without comments, which may be in any encoding.
     """
     first = _FIRST_LINE.match(content)
     if not first:
@@ -73,7 +75,8 @@ def _header(content):
         counts.append(int(match[2]))
         return match[1] + b" 0"
 
-    layout = PlyData.read(io.BytesIO(_ELEMENT.sub(without_rows, content[:start].replace(newline, b"\n"))))
+    header = _COMMENT.sub(b"", content[:start].replace(newline, b"\n"))
+    layout = PlyData.read(io.BytesIO(_ELEMENT.sub(without_rows, header)))
     if len(counts) != len(layout) or min(counts, default=0) < 0:
         raise ValueError("an element of its header has no valid count")
     return layout, counts, start

@@ -1,5 +1,6 @@
 """Points from text: tables of numbers and Wavefront OBJ."""
 
+import re
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
@@ -8,6 +9,8 @@ from typing import TextIO
 import numpy as np
 
 from ..errors import InputError
+
+_UNIT = re.compile(r"\([^)]*\)|\[[^]]*\]")  # as in "X (m)"
 
 
 def read_text(path: Path) -> np.ndarray:
@@ -20,7 +23,7 @@ def read_text(path: Path) -> np.ndarray:
         if first.isdecimal():
             claimed, first = int(first), next(rows, "")
         elif not any(map(_is_number, _split(first))):
-            columns, first = _named_columns(first), next(rows, "")
+            columns, first = _named_columns(path, first), next(rows, "")
         points = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), columns)
     if claimed not in (None, len(points)):
         raise InputError(f"{path} says {claimed} points in its first line, but {len(points)} follow; is it cut off?")
@@ -75,18 +78,26 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
 
 
 def _delimiter(row):
-    """None stands for any run of blanks."""
-    return next((mark for mark in ";," if mark in row), None)
+    """None stands for any run of blanks; tabs part columns that may hold blanks."""
+    if mark := next((mark for mark in ";," if mark in row), None):
+        return mark
+    cells = row.split("\t")
+    return "\t" if len(cells) >= 3 and all(cell.strip() for cell in cells) else None
 
 
 def _split(row):
     return [token.strip() for token in row.split(_delimiter(row))]
 
 
-def _named_columns(header):
-    """Where a line of names puts x, y and z; the first three columns if it does not say."""
-    names = [name.strip('"').lower() for name in _split(header)]
-    return tuple(map(names.index, "xyz")) if set("xyz") <= set(names) else (0, 1, 2)
+def _named_columns(path, header):
+    """Where a line of names puts x, y and z, with units or not; three columns of other names are taken for them."""
+    names = [name.strip('" ').lower() for name in _split(_UNIT.sub("", header))]
+    if set("xyz") <= set(names):
+        return tuple(map(names.index, "xyz"))
+    if len(names) > 3:
+        seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+        raise InputError(f"{path} has {len(names)} columns, named {seen}; name those of the coordinates x, y and z")
+    return 0, 1, 2
 
 
 def _is_number(token):

@@ -115,10 +115,11 @@ def _densest(row, points, spacing, tree, normals, agreed):
     every, best = np.arange(len(row)), share.argmax(axis=1)
     alike, sign = alike[every, best], np.sign(cosine[every, best])
     axes = np.einsum("rk,rki->ri", alike * weight * sign, images)
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
 
     near *= alike
-    rise = np.einsum("rk,rk->r", near, np.abs(_cosine(axes[:, None], direction))) / near.sum(axis=1)
+    rise = np.einsum("rk,rk->r", near, np.abs(_cosine(axes[:, None], direction)))
+    rise /= np.maximum(near.sum(axis=1), np.finfo(float).tiny)
     founded = (share[every, best] > share[:, 0] + _GAIN) & (alike.sum(axis=1) > _FEWEST) & (rise < _FLAT)
     return np.where(founded[:, None], axes, normals[row])
 

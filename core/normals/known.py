@@ -9,15 +9,22 @@ def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarr
     """Unit axes (n,3) and confidence (n,) of the samples at rows `source_index` (n,) of `count` points, from those of
     all points: `known` = (axes (count,3), confidence (count,)).
 
-    Raises :class:`InputError` where the shapes do not match or an axis has no direction.
+    Raises :class:`InputError` where these are no such arrays, an axis has no direction or a confidence is not finite.
     """
-    axes, confidence = (np.asarray(values, np.float64) for values in known)
+    try:
+        axes, confidence = (np.asarray(values, np.float64) for values in known)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"known normals are no pair of arrays of numbers ({error}); give (axes, confidence)"
+        ) from error
     if axes.shape != (count, 3) or confidence.shape != (count,):
         raise InputError(
             f"known normals have shapes {axes.shape} and {confidence.shape} for {count} points; give axes ({count},3) "
             f"and confidence ({count},)"
         )
     axes, confidence = axes[source_index], confidence[source_index]
+    if not np.isfinite(confidence).all():
+        raise InputError(f"{(~np.isfinite(confidence)).sum()} confidences are not finite; give numbers from 0 to 1")
     return unit_axes(axes, "known normals"), np.clip(confidence, 0.0, 1.0)
 
 

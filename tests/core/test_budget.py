@@ -98,8 +98,11 @@ def test_in_a_band_cost_grows_with_the_surface():
 
 
 def test_a_band_is_the_remedy_and_has_one_itself():
-    with pytest.raises(MemoryBudgetError, match=r"set band to 4"):
-        reconstruct(POINTS, Settings(resolution=256, memory_limit=300))
+    in_band = cost(POINTS, 256, band=4)[0].memory_mb
+    for limit, helps in ((in_band + 1, True), (in_band - 1, False)):
+        with pytest.raises(MemoryBudgetError) as caught:
+            reconstruct(POINTS, Settings(resolution=256, memory_limit=limit))
+        assert ("set band to 4" in str(caught.value)) is helps
     settings = Settings(resolution=1024, band=4, memory_limit=1000)
     estimate, grid = cost(POINTS, 1024, band=4)
     with pytest.raises(MemoryBudgetError) as caught:

@@ -144,6 +144,22 @@ def test_arrays_on_request(capsys, scan, calls, tmp_path):
         np.testing.assert_allclose(arrays["direction"], [[0, 0, 1], [0, 0, 0]])
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_the_scan_is_never_replaced(capsys, calls, tmp_path, linked):
+    scan = tmp_path / ("other.npz" if linked else "ball.npz")
+    np.savez(scan, points=np.random.default_rng(0).normal(size=(400, 3)))
+    if linked:
+        os.link(scan, tmp_path / "ball.npz")
+        scan = tmp_path / "link" / "ball.npz"
+        scan.parent.mkdir()
+        scan.symlink_to(tmp_path / "ball.npz")
+    before = scan.read_bytes()
+    err = refused(capsys, "reconstruct", scan, "-o", tmp_path, "--arrays")
+    assert "ball.npz would replace the scan" in err
+    assert scan.read_bytes() == before
+    assert run(capsys, "reconstruct", scan, "-o", tmp_path)[0] == 0
+
+
 def test_gradient_grid_on_request(capsys, scan, calls, tmp_path):
     openvdb = load_openvdb()
     for flags, names in (([], {"udf", "density"}), (["--gradient"], {"udf", "density", "gradient"})):
@@ -334,3 +350,21 @@ def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     assert running.returncode == 130
     assert err.count("\n") == 1
     assert os.listdir(tmp_path / "out") == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_output_that_cannot_be_printed_is_one_line(scan):
+    command = [sys.executable, "-m", "core", "info", scan]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 2
+    assert "standard output cannot be written to" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a file of the shell")
+def test_no_standard_output_is_none_needed(scan):
+    done = subprocess.run(
+        f"{sys.executable} -m core info {scan} >&-", shell=True, cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -362,3 +362,11 @@ def test_bust_is_hollow_and_closed_in_double():
     assert len(largest.faces) > 0.95 * len(result.surface.faces)
     assert KDTree(result.surface.vertices).query(result.points)[0].max() < 2 * result.field.spacing
     assert (result.field.sample(result.points) < 0.75 * result.field.spacing).all()
+
+
+def test_a_grid_too_coarse_for_the_points_is_said():
+    ball = shapes.sphere(2000)
+    far = reconstruct(np.concatenate([ball, ball + np.array([200, 0, 0])]), Settings(resolution=32, surface="none"))
+    assert [line for line in far.report["warnings"] if "cells apart" in line]
+    near = reconstruct(ball, Settings(resolution=32, surface="none"))
+    assert near.report["warnings"] == []

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core import DistanceField
+from core import DistanceField, InputError
 from tests import shapes
 
 ORIGIN, SPACING, SHAPE = np.array([10.0, -2.0, 3.0]), 0.25, (9, 5, 7)
@@ -108,3 +108,23 @@ def test_sampling_changes_nothing():
     assert field.sample(x).tobytes() == field.sample(x).tobytes()
     field.gradient(x)
     np.testing.assert_array_equal(x, kept)
+
+
+@pytest.mark.parametrize(
+    ("x", "message"),
+    [
+        ([0, 0, 0], r"shape \(3,\)"),
+        ([[0, 0], [1, 1]], r"shape \(2, 2\)"),
+        ([], r"shape \(0,\)"),
+        ("abc", "no array of numbers"),
+        ([[0, 0, np.nan], [0, 0, 0]], "1 of 2 points are not finite"),
+    ],
+)
+def test_what_are_no_points_is_refused(x, message):
+    for asked in (noise().sample, noise().gradient):
+        with pytest.raises(InputError, match=message):
+            asked(x)
+
+
+def test_no_points_have_no_distances():
+    assert noise().sample(np.empty((0, 3))).shape == (0,)

@@ -103,6 +103,7 @@ def test_line_ends_comments_and_objects_in_the_header(folder, newline, form):
     points = np.arange(12.0).reshape(4, 3)
     content = ply([vertices(points), faces(2)], comments=["element vertex 99", "made by hand"], **FORMATS[form])
     head, _, body = content.partition(b"end_header\n")
+    head = head.replace(b"by hand", b"by J\xc3\xbcrgen \xe9")
     content = head.replace(b"\n", newline) + b"end_header" + newline
     content += body.replace(b"\n", newline) if form == "ascii" else body
     np.testing.assert_array_equal(read_points(written(folder, content)), points)

@@ -55,6 +55,28 @@ def test_named_columns_are_found_wherever_they_stand(folder):
     assert read_points(written(folder, "scan.csv", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "X (m)\tY (m)\tZ (m)\tR\n1\t2\t3\t9\n4\t5\t6\t9\n",
+        "label of it\tX\tY\tZ\na wall\t1\t2\t3\nfloor\t4\t5\t6\n",
+        "X [m] Y [m] Z [m] R\n1 2 3 9\n4 5 6 9\n",
+        'id,"X [m]","Y [m]","Z [m]"\n7,1,2,3\n8,4,5,6\n',
+        "x\t y\tz\n1 2 3\n4 5 6\n",
+        "1\t\t2\t3\n4\t\t5\t6\n",
+    ],
+)
+def test_tabs_and_units_do_not_hide_columns(folder, text):
+    assert read_points(written(folder, "scan.txt", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_many_columns_of_other_names_are_refused(folder):
+    message = refusal(folder, "scan.csv", "Point,Easting,Northing,Elevation\n1,2,3,4\n")
+    assert "4 columns, named point, easting, northing, elevation; name those of the coordinates x, y and z" in message
+    three = written(folder, "scan.csv", "Easting,Northing,Elevation\n1,2,3\n4,5,6\n")
+    assert read_points(three).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
 def test_text_in_further_columns_is_ignored(folder):
     path = folder / "scan.txt"
     path.write_bytes(b"1 2 3 caf\xe9\n4 5 6 wall\n")

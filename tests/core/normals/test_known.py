@@ -34,8 +34,16 @@ def test_dropped_points_take_their_normals_along():
         (SPHERE, np.ones(3), r"shapes \(400, 3\) and \(3,\) for 400 points"),
         (np.where(np.arange(400)[:, None] < 2, 0.0, SPHERE), np.ones(400), "2 known normals have no direction"),
         (np.where(np.arange(400)[:, None] < 2, np.inf, SPHERE), np.ones(400), "2 known normals have no direction"),
+        (SPHERE, np.full(400, np.nan), "400 confidences are not finite"),
+        ("north", np.ones(400), "no pair of arrays"),
     ],
 )
 def test_what_cannot_be_used_is_refused(axes, confidence, message):
     with pytest.raises(InputError, match=message):
         known_normals((axes, confidence), 400, np.arange(400))
+
+
+@pytest.mark.parametrize("known", [5, SPHERE, (SPHERE,), ("a", "b")])
+def test_what_is_no_pair_is_refused(known):
+    with pytest.raises(InputError, match="no pair of arrays"):
+        known_normals(known, 400, np.arange(400))
