@@ -18,6 +18,7 @@ _SHIFT = 0.5  # cells, by which layers are held apart in looking for faces of th
 _NEAREST = 8  # faces that are tried
 _REACH = 0.75  # cells, farther sheets are others
 _OPPOSITE = -0.5  # largest cosine between the normals of either layer
+_SLIVER = 1e-6  # squared cells, twice the area of faces that have no direction
 _CHUNK = 1 << 12  # places
 
 
@@ -55,7 +56,7 @@ def _other_layer(mesh, place, outward, cell):
     inf where there is none within reach, and which it is, (m,)."""
     corners = at_corners(mesh.vertices, mesh.faces)
     normal = cross(corners[1] - corners[0], corners[2] - corners[0])
-    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    normal /= np.maximum(lengths(normal), _SLIVER * cell**2)
     held = sum(corners) / 3 - _SHIFT * cell * normal
     tree = KDTree(held.T, balanced_tree=False, compact_nodes=False)
     behind, which = np.full(len(place), np.inf), np.zeros(len(place), np.intp)
