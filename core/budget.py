@@ -10,9 +10,10 @@ from scipy.spatial import KDTree
 
 from .errors import MemoryBudgetError
 from .field.grid import Grid
-from .settings import WITH_SIDES, Settings, options
+from .settings import BESIDE_OFFSET, WITH_SIDES, Settings, options
 
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
+_BAND = 4.0  # cells, the band that is advised at least
 
 # Measured on 86 runs over 100 to 200,000 samples, resolutions of 64 to 512: the Voronoi diagram by samples, the field
 # by nodes, the meshes by nodes and by squared cells of the surface. One is over before the next begins.
@@ -80,7 +81,7 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     least = options()["resolution"].metadata["limits"][0]
     area, coarser = float(np.sum((spacing / grid.spacing) ** 2)), range(settings.resolution - 1, least - 1, -1)
     if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
-        band = ", set band to 4" if _fits_in_band(len(spacing), area, limit, settings) else ""
+        band = _fitting_band(len(spacing), area, limit, settings)
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
     else:
         fitting = max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))
@@ -116,10 +117,12 @@ def _memory_at(resolution, samples, area, grid, settings):
     return _memory(samples, area * ratio**2, nodes, settings)
 
 
-def _fits_in_band(samples, area, limit, settings):
+def _fitting_band(samples, area, limit, settings):
+    """The advice to set a band, where that is possible and fits."""
     if settings.band is not None or settings.integration != "transport":
-        return False
-    return _memory(samples, area, 0, replace(settings, band=4.0)) <= limit
+        return ""
+    in_band = replace(settings, band=max(_BAND, settings.offset + BESIDE_OFFSET))
+    return f", set band to {in_band.band:g}" if _memory(samples, area, 0, in_band) <= limit else ""
 
 
 def _probe():

@@ -103,6 +103,8 @@ def test_a_band_is_the_remedy_and_has_one_itself():
         with pytest.raises(MemoryBudgetError) as caught:
             reconstruct(POINTS, Settings(resolution=256, memory_limit=limit))
         assert ("set band to 4" in str(caught.value)) is helps
+    with pytest.raises(MemoryBudgetError, match=r"set band to 5,"):
+        reconstruct(POINTS, Settings(resolution=256, offset=3, memory_limit=in_band + 1))
     settings = Settings(resolution=1024, band=4, memory_limit=1000)
     estimate, grid = cost(POINTS, 1024, band=4)
     with pytest.raises(MemoryBudgetError) as caught:
