@@ -91,28 +91,22 @@ def _told(case):
 def gaps(mesh: Mesh, cell: float, seed: int = 0) -> np.ndarray:
     """How far the other layer lies behind points of the mesh that are uniform by area, in cells, negative where it lies
     in front; of the points that have one within .75 cell."""
-    place, face = surface_samples(mesh, _COUNT, np.random.default_rng(seed))
-    found, _ = _behind(mesh, place, face_normals(mesh)[face], cell)
-    return found[np.isfinite(found)]
-
-
-def _behind(mesh, place, outward, cell):
-    """Along the lines through places (m,3), the nearest faces of the other layer: how far behind they lie in cells,
-    (m,) float64, nan where there is none within reach, and which they are, (m,)."""
     import open3d
 
+    place, face = surface_samples(mesh, _COUNT, np.random.default_rng(seed))
+    normal = face_normals(mesh)
+    outward = normal[face]
     scene = open3d.t.geometry.RaycastingScene()
     scene.add_triangles(*(open3d.core.Tensor(x) for x in (np.float32(mesh.vertices), np.uint32(mesh.faces))))
     rays = np.concatenate([place + _REACH * cell * outward, -outward], axis=1).astype(np.float32)
     hits = scene.list_intersections(open3d.core.Tensor(rays))
     ray = np.repeat(np.arange(len(place)), np.diff(hits["ray_splits"].numpy()))
-    face, behind = hits["primitive_ids"].numpy().astype(np.int64), hits["t_hit"].numpy() / cell - _REACH
-    other = np.einsum("hi,hi->h", face_normals(mesh)[face], outward[ray]) < _OPPOSITE
-    kept = np.flatnonzero(other & (np.abs(behind) < _REACH))
-    kept = kept[np.argsort(-np.abs(behind[kept]), kind="stable")]  # the nearest last
-    distance, nearest = np.full(len(place), np.nan), np.full(len(place), -1)
-    distance[ray[kept]], nearest[ray[kept]] = behind[kept], face[kept]
-    return distance, nearest
+    hit, behind = hits["primitive_ids"].numpy(), hits["t_hit"].numpy() / cell - _REACH
+    kept = (np.einsum("hi,hi->h", normal[hit], outward[ray]) < _OPPOSITE) & (np.abs(behind) < _REACH)
+    nearest_last = np.flatnonzero(kept)[np.argsort(-np.abs(behind[kept]), kind="stable")]
+    found = np.full(len(place), np.nan)
+    found[ray[nearest_last]] = behind[nearest_last]
+    return found[np.isfinite(found)]
 
 
 def write_page(rows: list[dict], docs: Path) -> Path:

@@ -29,7 +29,8 @@ from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
 
 PROGRAM = "python -m core"
-_ENDINGS = "_points.ply", ".vdb", "_signed.ply", "_double.ply", "_single.ply", ".npz", ".json"
+_MESHES = {kind: f"_{kind}.ply" for kind in ("double", "single", "signed")}
+_POINTS, _VOLUME, _ARRAYS, _REPORT = "_points.ply", ".vdb", ".npz", ".json"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
 DONE, BAD_INPUT, TOO_LARGE, CANCELLED = 0, 2, 3, 130
 
@@ -176,7 +177,7 @@ def _reconstruct(given):
 
 def _spare(scan, folder, arrays):
     """Raise :class:`InputError` where a file that is to be written is the scan itself."""
-    for ending in _ENDINGS if arrays else set(_ENDINGS) - {".npz"}:
+    for ending in (_POINTS, _VOLUME, *_MESHES.values(), *([_ARRAYS] if arrays else []), _REPORT):
         path = folder / f"{scan.stem}{ending}"
         if path.exists() and path.samefile(scan):
             raise InputError(f"{path} would replace the scan, which is that file; give another folder for the results")
@@ -213,17 +214,17 @@ def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
     """Write every file; the report, which lists them, goes last. Returns the report."""
     samples = dict(points=result.points, normals=result.normals, attributes=sample_attributes(result, carried))
     writers = {
-        "_points.ply": partial(write_points, **samples),
-        ".vdb": partial(write_vdb, field=result.field, gradient=gradient),
+        _POINTS: partial(write_points, **samples),
+        _VOLUME: partial(write_vdb, field=result.field, gradient=gradient),
     }
-    closed = "_signed.ply" if result.field.sdf else "_double.ply"
-    for ending, mesh in ((closed, result.surface), ("_single.ply", result.sheet)):
+    closed = _MESHES["signed" if result.field.sdf else "double"]
+    for ending, mesh in ((closed, result.surface), (_MESHES["single"], result.sheet)):
         if mesh is not None:
             writers[ending] = partial(write_mesh, mesh=mesh, attributes=vertex_attributes(mesh, result, carried))
     if arrays:
-        writers[".npz"] = partial(write_arrays, result=result)
+        writers[_ARRAYS] = partial(write_arrays, result=result)
 
-    summary = folder / f"{scan.stem}.json"
+    summary = folder / f"{scan.stem}{_REPORT}"
     report = {**result.report, "scan": scan, "files": [], "warnings": list(result.report["warnings"])}
     for ending, write in writers.items():
         path = folder / f"{scan.stem}{ending}"

@@ -20,7 +20,7 @@ from .parallel import in_order
 from .points import local_spacing, prepare_samples
 from .progress import Progress, watched
 from .reconstruction import Reconstruction
-from .settings import Settings
+from .settings import WHOLE_BOX, Settings
 from .surface.extract import Surfaces, band_for, extract_surfaces
 from .surface.pieces import piece_count
 from .surface.quality import quad_quality, triangle_quality
@@ -137,7 +137,7 @@ def _too_coarse(spacing, grid):
         return ()
     return (
         f"points lie {cells:.2g} cells apart, and what they show within a cell is lost; raise the resolution, beyond "
-        "512 with a band, or reconstruct parts that lie far from each other one by one",
+        f"{WHOLE_BOX} with a band, or reconstruct parts that lie far from each other one by one",
     )
 
 

@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 
 from .errors import SettingsError
-from .field.grid import PADDING
+from .field.grid import padding_cells
 
 WHOLE_BOX = 512  # cells, the finest resolution without a band
 BESIDE_OFFSET = 2  # cells that a band reaches beyond the offset, at least
@@ -153,12 +153,12 @@ class Settings:
                 f"band is {self.band:g} and offset {self.offset:g}; use a band of {self.offset + BESIDE_OFFSET:g} or "
                 "more, or lower the offset"
             )
-        room = PADDING / (1 + 2 * PADDING)
-        if self.offset > room * self.resolution and self.surface not in ("none", "signed"):
+        room = padding_cells(self.resolution)
+        if self.offset > room and self.surface not in ("none", "signed"):
             raise SettingsError(
-                f"offset is {self.offset:g} and resolution {self.resolution}, which leaves {room * self.resolution:g} "
-                f"cells around the points; use an offset of {room * self.resolution:g} or less, or a resolution of "
-                f"{ceil(self.offset / room)} or more"
+                f"offset is {self.offset:g} and resolution {self.resolution}, which leaves {room:g} cells around the "
+                f"points; use an offset of {room:g} or less, or a resolution of {ceil(self.offset / padding_cells(1))} "
+                "or more"
             )
         if self.diffusion == "grid" and self.integration != "poisson":
             raise SettingsError(

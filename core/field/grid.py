@@ -26,6 +26,11 @@ class Grid:
         return np.ravel_multi_index(cells.T, self.shape)
 
 
+def padding_cells(resolution: int) -> float:
+    """Cells that the padding is wide, of a grid with `resolution` cells along its longest side."""
+    return resolution * PADDING / (1 + 2 * PADDING)
+
+
 def node_strides(shape: tuple[int, int, int]) -> np.ndarray:
     """Steps of the flat index of nodes along the three axes, (3,) int64."""
     return np.array([shape[1] * shape[2], shape[2], 1])

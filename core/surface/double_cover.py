@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..field.blocks import each
-from ..field.grid import PADDING, Grid
+from ..field.grid import Grid, padding_cells
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
@@ -34,8 +34,7 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     `spot_sparse500` of the benchmarks its Euler number is -48 at 1 cell and -18 at the 2.5 that this is; 4 is right.
     """
     raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
-    padding = (max(grid.shape) - 1) * PADDING / (1 + 2 * PADDING)
-    return max(offset, min(raised, _WITHIN * padding))
+    return max(offset, min(raised, _WITHIN * padding_cells(max(grid.shape) - 1)))
 
 
 def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:

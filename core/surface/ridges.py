@@ -7,8 +7,6 @@ high the ridge is.
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, at_nodes, put
@@ -16,6 +14,7 @@ from ..field.grid import Grid
 from ..field.steps import NearBand
 from ..linalg import dots
 from ..parallel import in_order
+from .sides import patches
 
 _DIAGONAL = np.sqrt(2)  # cells: iso-surfaces may join nodes as far apart, at opposite corners of a face
 _FACING = -0.5  # largest cosine between the steps to both: wedges wider than 60 degrees need no help
@@ -40,20 +39,13 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
         for end in ends:
             np.maximum.at(height, end, found)
     row = np.flatnonzero(height)
-    row = row[_long(grid.positions(band.node[row]), _NEXT * grid.spacing)]
+    ridge = patches(grid.positions(band.node[row]), grid, _NEXT)
+    row = row[np.bincount(ridge)[ridge] >= _LEAST]
     own, typical = height[row], _averaged(height[row], grid.positions(band.node[row]), _AROUND * grid.spacing)
     off = _DIAGONAL * grid.spacing - level
     least = max(level, off + 0.5 * _DIAGONAL * grid.spacing)
     raised = (typical > np.maximum(least, away[row])) & (own > _OWN * least) & (away[row] > off)
     put(values, band.node[row[raised]], typical[raised].astype(np.float32))
-
-
-def _long(place, reach):
-    """Whether places (m,3) are in a ridge of many, each within reach of the next, (m,) bool."""
-    pairs = KDTree(place).query_pairs(reach, output_type="ndarray").T if len(place) else np.empty((2, 0), int)
-    links = coo_matrix((np.ones(pairs.shape[1], bool), tuple(pairs)), shape=(len(place),) * 2)
-    _, ridge = connected_components(links, directed=False)
-    return np.bincount(ridge)[ridge] >= _LEAST
 
 
 def _averaged(height, place, reach):

@@ -158,10 +158,10 @@ def _without_specks(inside):
     return inside
 
 
-def patches(middle: np.ndarray, grid: Grid) -> np.ndarray:
-    """Number of the patch of each edge of the grid, (m,), by their middles (m,3): those of one patch are next to each
-    other."""
+def patches(middle: np.ndarray, grid: Grid, reach: float = _ADJACENT) -> np.ndarray:
+    """Number of the patch of each edge of the grid, (m,), by their middles (m,3), or of other places: those of one
+    patch are next to each other, within `reach` cells."""
     if not len(middle):
         return np.empty(0, np.int64)
-    pairs = KDTree(middle).query_pairs(_ADJACENT * grid.spacing, output_type="ndarray")
+    pairs = KDTree(middle).query_pairs(reach * grid.spacing, output_type="ndarray")
     return connected_components(symmetric(np.ones(len(pairs), bool), *pairs.T, len(middle)), directed=False)[1]
