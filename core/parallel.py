@@ -8,6 +8,7 @@ from itertools import islice
 
 _AHEAD = 2  # chunks in work or waiting for it, per core
 _HELD = 16  # chunks begun and not yet handed on, per core: those behind a large one go on meanwhile
+_FEW = 2048  # rows, hardly worth a thread
 
 
 def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
@@ -16,7 +17,7 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
     Threads serve, since NumPy and SciPy let go of the interpreter in their loops. What an iterator of `chunks` does
     (report progress, cancel) happens in the caller's thread; when it raises, no thread is left.
     """
-    cores, chunks, begun = os.cpu_count() or 1, iter(chunks), deque()
+    cores, chunks, begun = _cores(), iter(chunks), deque()
     with ThreadPoolExecutor(cores) as pool:
         try:
             while True:
@@ -32,3 +33,13 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
                     wait([result for _, result in begun if not result.done()], return_when=FIRST_COMPLETED)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def even_size(count: int, most: int) -> int:
+    """Rows of chunks, at most `most`, that `count` rows are cut into so that no core waits for others at the end."""
+    chunks = max(_cores() * -(-count // (_cores() * most)), 1)
+    return min(max(-(-count // chunks), _FEW), most)
+
+
+def _cores():
+    return os.cpu_count() or 1

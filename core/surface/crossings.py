@@ -20,6 +20,7 @@ from ..field.grid import CORNERS, Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
+from ..parallel import even_size, in_order
 from ..progress import Progress
 from .first_steps import first_steps
 from .meeting_edges import meeting_edges
@@ -28,6 +29,8 @@ from .mending import mend
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
 _SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
+
+_CHUNK = 1 << 15  # cells
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
 _EDGE_AXIS = np.abs(CORNERS[_EDGES[:, 1]] - CORNERS[_EDGES[:, 0]]).argmax(axis=1)
@@ -63,9 +66,8 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     progress, strides, hair = Progress.of(progress), node_strides(grid.shape), _HAIR * grid.spacing
     meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.4))
     progress(0.4)
-    cells, side = _sides(band, grid)
-    progress(0.45)
-    edge, vote, place = _vote(cells, side, grid)
+    cells, corner = _whole_cells(band, grid)
+    edge, vote, place = _vote(band, corner, grid, progress.part(0.4, 0.5))
     progress(0.5)
     alone = ~np.isin(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
     edge, vote, place = edge[alone], vote[alone], place[alone]
@@ -122,33 +124,45 @@ def _cells_around(node, axis, strides):
     return node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
 
 
-def _sides(band, grid):
-    """Cells with all corners in the band, by their lowest node, (c,) ascending, and each corner's signed distance along
-    the cell's normal, (c,8); the sign is the cell's own."""
+def _whole_cells(band, grid):
+    """Cells with all corners in the band, by their lowest node, (c,) ascending, and the rows of the corners, (c,8)."""
     at = np.stack(np.unravel_index(band.node, grid.shape), axis=1)
     lowest = band.node[(at < np.array(grid.shape) - 1).all(axis=1)]
     corner = np.stack([band.rows(lowest + step) for step in CORNERS @ node_strides(grid.shape)], axis=1)
     whole = (corner >= 0).all(axis=1)
-    lowest, corner = lowest[whole], corner[whole]
-    step = band.step[corner] + _HAIR * grid.spacing
+    return lowest[whole], corner[whole]
+
+
+def _vote(band, corner, grid, progress):
+    """Edges of cells with corners (c,8), as lower node * 3 + axis (e,), votes that they are crossed, positive if so,
+    (e,), and the likely places (e,3)."""
+    chunks = progress.chunks(len(corner), even_size(len(corner), _CHUNK))
+    cast = in_order(lambda part: _ballots(band.step[corner[part]], grid), chunks)
+    ballots = zip((np.empty(0),) * 3, *(found for _, found in cast), strict=True)
+    number = (3 * corner[:, _EDGES[:, 0]] + _EDGE_AXIS).reshape(-1)
+    counts = in_order(lambda each: np.bincount(number, np.concatenate(each)), ballots)
+    vote, weight, share = (count for _, count in counts)
+    voted = np.flatnonzero(weight)
+    row, axis = np.divmod(voted, 3)
+    share = share[voted] / weight[voted]
+    place = grid.positions(band.node[row]) + grid.spacing * share[:, None] * np.eye(3)[axis]
+    return 3 * band.node[row] + axis, vote[voted], place
+
+
+def _ballots(step, grid):
+    """For each edge of cells with steps (c,8,3) to their corners, the vote that it is crossed, how certain that is, and
+    where along it the surface is, times that; (12 c,) each."""
+    side = _sides(step + _HAIR * grid.spacing)
+    a, b = side[:, _EDGES[:, 0]].reshape(-1), side[:, _EDGES[:, 1]].reshape(-1)
+    certain = np.minimum(np.abs(a), np.abs(b)) + 1e-9 * grid.spacing
+    share = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
+    return np.where((a >= 0) != (b >= 0), certain, -certain), certain, certain * share
+
+
+def _sides(step):
+    """Signed distances of the corners of cells along the cell's normal, (c,8), from the steps to them (c,8,3); the sign
+    is the cell's own."""
     slope = np.einsum("cki,kj->cij", step, CORNERS - 0.5)
     slope = slope + slope.transpose(0, 2, 1)
     normal, _ = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
-    return lowest, np.einsum("cki,ci->ck", step, normal)
-
-
-def _vote(cells, side, grid):
-    """Edges of the cells, as lower node * 3 + axis (e,), votes that they are crossed, positive if so, (e,), and the
-    likely places (e,3)."""
-    a, b = side[:, _EDGES[:, 0]], side[:, _EDGES[:, 1]]
-    key = 3 * (cells[:, None] + CORNERS[_EDGES[:, 0]] @ node_strides(grid.shape)) + _EDGE_AXIS
-    opposite = (a >= 0) != (b >= 0)
-    certain = np.minimum(np.abs(a), np.abs(b)) + 1e-9 * grid.spacing
-    share = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
-    edge, index = np.unique(key.reshape(-1), return_inverse=True)
-    index = index.reshape(-1)
-    vote = np.bincount(index, np.where(opposite, certain, -certain).reshape(-1), len(edge))
-    weight = np.bincount(index, certain.reshape(-1), len(edge))
-    share = np.bincount(index, (certain * share).reshape(-1), len(edge)) / weight
-    node, axis = np.divmod(edge, 3)
-    return edge, vote, grid.positions(node) + grid.spacing * share[:, None] * np.eye(3)[axis]
+    return np.einsum("cki,ci->ck", step, normal)

@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER, TRUSTED, membership
+from ..parallel import even_size, in_order
 from ..progress import Progress
 
 NEIGHBOURS = 32
@@ -57,26 +58,33 @@ def _goes_past(i, j, surface):
     """Whether the sheet of either sample has samples well on both sides of the other's tangent plane."""
     every = np.unique(np.concatenate([i, j]))
     wide, member = _members(surface, every, _WIDER, Progress())
-    member = member > _STRAIGHT
-    member &= surface.confidence[wide] >= _LINKED
-    past = np.zeros(len(i), bool)
-    for one, other in ((i, j), (j, i)):
-        row = np.searchsorted(every, one)
-        away = surface.points[wide[row]] - surface.points[other][:, None]
-        height = np.einsum("mki,mi->mk", away, surface.normals[other])
-        limit = _PAST * surface.spacing[one]
-        above = np.where(member[row], height, -np.inf).max(axis=1) > limit
-        past |= above & (np.where(member[row], height, np.inf).min(axis=1) < -limit)
-    return past
+    member = (member > _STRAIGHT) & (surface.confidence[wide] >= _LINKED)
+
+    def look(part):
+        past = np.zeros(len(i[part]), bool)
+        for one, other in ((i[part], j[part]), (j[part], i[part])):
+            row = np.searchsorted(every, one)
+            away = surface.points[wide[row]] - surface.points[other][:, None]
+            height = np.einsum("mki,mi->mk", away, surface.normals[other])
+            limit = _PAST * surface.spacing[one]
+            above = np.where(member[row], height, -np.inf).max(axis=1) > limit
+            past |= above & (np.where(member[row], height, np.inf).min(axis=1) < -limit)
+        return past
+
+    chunks = Progress().chunks(len(i), even_size(len(i), _CHUNK))
+    return np.concatenate([np.empty(0, bool), *(past for _, past in in_order(look, chunks))])
 
 
 def _members(surface, own, k, progress):
     """The k samples nearest to the samples `own` (m,), and how surely each lies on one sheet with them, (m,k)."""
     k = min(k, len(surface.points))
     nearest, member = np.empty((len(own), k), np.int64), np.empty((len(own), k), np.float32)
-    for part in progress.chunks(len(own), _CHUNK):
-        nearest[part] = surface.tree.query(surface.points[own[part]], k=k, workers=-1)[1]
-        between = np.moveaxis(surface.points[nearest[part]] - surface.points[own[part]][:, None], 2, 0)
-        normals = np.moveaxis(surface.normals[nearest[part]], 2, 0)
-        member[part] = membership(between, surface.normals[own[part]].T, normals)
+
+    def look(part):
+        near = surface.tree.query(surface.points[own[part]], k=k)[1]
+        between = np.moveaxis(surface.points[near] - surface.points[own[part]][:, None], 2, 0)
+        return near, membership(between, surface.normals[own[part]].T, np.moveaxis(surface.normals[near], 2, 0))
+
+    for part, found in in_order(look, progress.chunks(len(own), even_size(len(own), _CHUNK))):
+        nearest[part], member[part] = found
     return nearest, member

@@ -83,8 +83,9 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     degree = np.diff(graph.indptr).astype(float)
     vertices[row] += spsolve((diags(degree) - graph[:, row]).tocsc(), graph @ moved)
     for _ in range(_RELAXED):
-        vertices[row] += _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
-        _settle(vertices, row, axis, surface)
+        step = _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
+        vertices[row] += step - np.einsum("vi,vi->v", step, axis[row])[:, None] * axis[row]
+    _settle(vertices, row, axis, surface)
     return replace(mesh, vertices=vertices)
 
 

@@ -94,12 +94,12 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     inside_a = at_nodes(inside, a)
     differ = inside_a != at_nodes(inside, b)
     alike, spanned = crossed & ~differ, ~crossed & differ
-    middle = 0.5 * (grid.positions(a) + grid.positions(b))
-    largest = max(np.bincount(patches(middle[chosen], grid)).max(initial=0) for chosen in (alike, spanned))
+    same, gaps = (0.5 * (grid.positions(a[chosen]) + grid.positions(b[chosen])) for chosen in (alike, spanned))
+    largest = max(np.bincount(patches(middle, grid)).max(initial=0) for middle in (same, gaps))
     total = max(int(crossed.sum()), 1)
     return Sides(
         inside=inside,
-        alike=middle[alike],
+        alike=same,
         within=inside_a[alike],
         share=int(alike.sum()) / total,
         spanned=int(spanned.sum()) / total,

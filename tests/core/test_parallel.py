@@ -3,9 +3,11 @@
 import os
 import threading
 
+import numpy as np
 import pytest
 
-from core.parallel import _HELD, in_order
+from core import Settings, reconstruct
+from core.parallel import _FEW, _HELD, even_size, in_order
 
 CORES = os.cpu_count() or 1
 pytestmark = pytest.mark.skipif(CORES < 2, reason="one core works on chunks one after another")
@@ -53,3 +55,34 @@ def test_where_chunks_raise_no_thread_is_left():
 def test_what_work_raises_comes_out():
     with pytest.raises(ZeroDivisionError):
         list(in_order(lambda x: 1 / x, [1, 0, 1]))
+
+
+@pytest.mark.parametrize("count", [1, _FEW, _FEW + 1, 8192, 8193, 20_000, 50_000, 1_000_000])
+@pytest.mark.parametrize("cores", [1, 2, 3, 16])
+def test_even_chunks_keep_all_cores_at_work_to_the_end(count, cores, monkeypatch):
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    size = even_size(count, 8192)
+    chunks = -(-count // size)
+    assert size <= 8192
+    assert chunks % cores == 0 or size == _FEW
+    assert chunks == 1 or count - (chunks - 1) * size > size - chunks or size == _FEW
+
+
+def test_no_rows_are_one_chunk_of_any_size():
+    assert even_size(0, 8192) > 0
+
+
+def test_what_comes_out_does_not_depend_on_the_number_of_cores(monkeypatch):
+    points = np.random.default_rng(0).normal(size=(3000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    points = points[points[:, 2] < 0.6]
+    found = []
+    for cores in (1, 2, 5):
+        monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores)
+        found.append(reconstruct(points, Settings(resolution=48, surface="both")))
+    for other in found[1:]:
+        assert np.array_equal(other.field.values, found[0].field.values)
+        for kind in ("surface", "sheet"):
+            meshes = getattr(other, kind), getattr(found[0], kind)
+            assert np.array_equal(*(mesh.vertices for mesh in meshes))
+            assert np.array_equal(*(mesh.faces for mesh in meshes))

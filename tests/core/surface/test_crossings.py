@@ -112,6 +112,12 @@ def test_a_sheet_through_grid_nodes_is_one_plane_of_edges():
     assert len(set(np.unravel_index(found.node, GRID.shape)[2])) == 1
 
 
+def test_a_band_without_a_whole_cell_crosses_nothing(sphere):
+    band, surface = sphere
+    found = find_crossings(NearBand(band.node[:1], band.step[:1], band.past_rim[:1]), surface, GRID)
+    assert len(found.node) == len(found.cells) == 0
+
+
 def test_stops_when_told(sphere):
     with pytest.raises(Cancelled):
         find_crossings(*sphere, GRID, lambda *_: False)
