@@ -53,6 +53,18 @@ class Samples:
         return replace(self, points=points[kept], given=given[kept], source_index=self.source_index[kept])
 
 
+def real_numbers(given, what: str, wanted: str) -> np.ndarray:
+    """An array-like as float64. Raises :class:`InputError`, with `what` it is and what is `wanted` instead, where it is
+    none, or complex."""
+    try:
+        given = np.asarray(given)
+        if np.iscomplexobj(given):
+            raise TypeError("complex numbers")
+        return given.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
+
+
 def prepare_samples(points) -> Samples:
     """Check an (n,3) array-like, drop rows that are not finite and exact duplicates, and scale to the unit frame.
 
@@ -60,13 +72,7 @@ def prepare_samples(points) -> Samples:
     same samples bit for bit. Raises :class:`InputError` for a wrong shape or type, fewer than 4 distinct finite
     points, or points on one line (a plane is fine).
     """
-    try:
-        points = np.asarray(points)
-        if np.iscomplexobj(points):
-            raise TypeError("complex numbers")
-        points = points.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"points are not an array of real numbers ({error}); give an (n,3) array") from error
+    points = real_numbers(points, "points", "an (n,3) array")
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points have shape {points.shape}; give an (n,3) array of x, y, z")
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ..errors import InputError, VADError
+from ..points import real_numbers
 from .blocks import Blocks
 from .feet import Feet
 from .grid import CORNERS
@@ -39,10 +40,7 @@ class _OnGrid:
 
 
 def _points(x):
-    try:
-        x = np.asarray(x, np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"points are no array of numbers ({error}); give an (m,3) array") from error
+    x = real_numbers(x, "points", "an (m,3) array")
     if x.ndim != 2 or x.shape[1] != 3:
         raise InputError(f"points have shape {x.shape}; give an (m,3) array")
     if not np.isfinite(x).all():

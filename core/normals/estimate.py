@@ -5,6 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from ..errors import InputError, SettingsError
+from ..points import real_numbers
 from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples
@@ -94,9 +95,10 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
         return None, ()
     try:
         indices, axes = constraints
-        indices, axes = np.asarray(indices), np.asarray(axes, np.float64)
+        indices = np.asarray(indices)
     except (TypeError, ValueError) as error:
         raise InputError(f"constraints are not (indices, axes): {error}") from error
+    axes = real_numbers(axes, "constraint axes", "a (k,3) array")
     if indices.ndim != 1 or axes.shape != (len(indices), 3) or (len(indices) and indices.dtype.kind not in "iu"):
         raise InputError(
             f"constraints have shapes {indices.shape} and {axes.shape}; give whole-number indices (k,) and axes (k,3)"

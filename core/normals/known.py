@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..errors import InputError
+from ..points import real_numbers
 
 
 def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarray]:
@@ -12,11 +13,11 @@ def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarr
     Raises :class:`InputError` where these are no such arrays, an axis has no direction or a confidence is not finite.
     """
     try:
-        axes, confidence = (np.asarray(values, np.float64) for values in known)
+        axes, confidence = known
     except (TypeError, ValueError) as error:
-        raise InputError(
-            f"known normals are no pair of arrays of numbers ({error}); give (axes, confidence)"
-        ) from error
+        raise InputError(f"known normals are no pair of arrays ({error}); give (axes, confidence)") from error
+    axes = real_numbers(axes, "known normals", f"({count},3)")
+    confidence = real_numbers(confidence, "confidences", f"({count},)")
     if axes.shape != (count, 3) or confidence.shape != (count,):
         raise InputError(
             f"known normals have shapes {axes.shape} and {confidence.shape} for {count} points; give axes ({count},3) "

@@ -279,7 +279,9 @@ def test_no_constraints_and_constraints_on_dropped_rows_change_nothing():
 @pytest.mark.parametrize(
     ("constraints", "message"),
     [
-        ("ab", "constraints are not"),
+        ("ab", "constraint axes are not an array of real numbers"),
+        (([0], [[1j, 0, 0]]), "constraint axes are not .*complex numbers"),
+        (([[0], [1, 2]], EYE[:2]), "constraints are not"),
         (([0],), "constraints are not"),
         (([0, 1], EYE[:1]), r"\(2,\).*\(1, 3\)"),
         (([0], [[1, 0]]), r"\(1,\).*\(1, 2\)"),

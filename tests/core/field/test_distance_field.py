@@ -116,7 +116,8 @@ def test_sampling_changes_nothing():
         ([0, 0, 0], r"shape \(3,\)"),
         ([[0, 0], [1, 1]], r"shape \(2, 2\)"),
         ([], r"shape \(0,\)"),
-        ("abc", "no array of numbers"),
+        ("abc", "not an array of real numbers"),
+        ([[0, 0, 1j]], "complex numbers"),
         ([[0, 0, np.nan], [0, 0, 0]], "1 of 2 points are not finite"),
     ],
 )
