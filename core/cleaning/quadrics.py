@@ -16,7 +16,7 @@ _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
-_CHUNK = 30_000  # neighbours
+_CHUNK = 60_000  # neighbours
 
 # Where the moments 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy stand in the normal equations.
 _MOMENTS = np.array(
