@@ -16,8 +16,8 @@ def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarr
         axes, confidence = known
     except (TypeError, ValueError) as error:
         raise InputError(f"known normals are no pair of arrays ({error}); give (axes, confidence)") from error
-    axes = real_numbers(axes, "known normals", f"({count},3)")
-    confidence = real_numbers(confidence, "confidences", f"({count},)")
+    axes = real_numbers(axes, "known normals", f"a ({count},3) array")
+    confidence = real_numbers(confidence, "confidences", f"a ({count},) array")
     if axes.shape != (count, 3) or confidence.shape != (count,):
         raise InputError(
             f"known normals have shapes {axes.shape} and {confidence.shape} for {count} points; give axes ({count},3) "

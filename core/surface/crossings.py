@@ -29,7 +29,6 @@ from .mending import mend
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
 _SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
-
 _CHUNK = 1 << 15  # cells
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
