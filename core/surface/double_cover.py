@@ -74,8 +74,9 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = _moved(vertices, surface.project(vertices, progress.part(0.3, 0.7)).step, level)
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
     mesh = mesh_of(vertices, faces)
+    progress(0.8)
     dense = np.median(surface.spacing) < _DENSE * grid.spacing
-    mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing)
+    mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
 

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from ..linalg import cross, dots, lengths
 from ..parallel import in_order
+from ..progress import Progress
 from .centring import Bend, bend_of
 from .mesh import Mesh, at_corners
 
@@ -22,7 +23,7 @@ _SLIVER = 1e-6  # squared cells, twice the area of faces that have no direction
 _CHUNK = 1 << 12  # places
 
 
-def laid_apart(mesh: Mesh, cell: float) -> Mesh:
+def laid_apart(mesh: Mesh, cell: float, progress=None) -> Mesh:
     """The mesh, whose vertices lie on the surface, with layers that are wound away from each other laid apart.
 
     Vertices move outwards along their normals, by as much as the faces around them dip below the surface: so each layer
@@ -32,18 +33,19 @@ def laid_apart(mesh: Mesh, cell: float) -> Mesh:
 
     cell : length of one, in the units of the mesh
     """
-    bend, dip = bend_of(mesh), np.zeros(len(mesh.vertices))
+    progress, bend, dip = Progress.of(progress), bend_of(mesh), np.zeros(len(mesh.vertices))
+    progress(0.2)
     np.maximum.at(dip, mesh.faces.reshape(-1), np.repeat(np.maximum(bend.at_centroids(), bend.at_edges()), 3))
-    return _cleared(bend.moved(mesh, dip + _HAIR * cell), bend, cell)
+    return _cleared(bend.moved(mesh, dip + _HAIR * cell), bend, cell, progress.part(0.4, 1.0))
 
 
-def _cleared(mesh: Mesh, bend: Bend, cell: float) -> Mesh:
+def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
     beside = np.zeros(len(mesh.vertices), bool)
     beside[mesh.faces[bend.sharp[mesh.faces].any(axis=1)]] = True
     ends = np.concatenate([np.tile(np.flatnonzero(beside)[:, None], 2), bend.edges[beside[bend.edges].all(axis=1)]]).T
     place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
-    behind, face = _other_layer(mesh, place, outward, cell)
+    behind, face = _other_layer(mesh, place, outward, cell, progress)
     lack = 0.5 * np.maximum(_HAIR * cell - behind, 0.0)
     step = np.zeros(len(mesh.vertices))
     for corner in (*ends, *mesh.faces[face].T):
@@ -51,13 +53,14 @@ def _cleared(mesh: Mesh, bend: Bend, cell: float) -> Mesh:
     return replace(mesh, vertices=mesh.vertices + step[:, None] * bend.normal)
 
 
-def _other_layer(mesh, place, outward, cell):
+def _other_layer(mesh, place, outward, cell, progress):
     """Along the lines through places (m,3), how far behind them the nearest face of the other layer lies, (m,) float64,
     inf where there is none within reach, and which it is, (m,)."""
     corners = at_corners(mesh.vertices, mesh.faces)
     normal = cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.maximum(lengths(normal), _SLIVER * cell**2)
     held = sum(corners) / 3 - _SHIFT * cell * normal
+    progress(0.0)
     tree = KDTree(held.T, balanced_tree=False, compact_nodes=False)
     behind, which = np.full(len(place), np.inf), np.zeros(len(place), np.intp)
 
@@ -74,6 +77,6 @@ def _other_layer(mesh, place, outward, cell):
         which[part] = face[nearest]
         behind[part] = np.where(hit[nearest], depth[nearest], np.inf)
 
-    for _ in in_order(look, [slice(first, first + _CHUNK) for first in range(0, len(place), _CHUNK)]):
+    for _ in in_order(look, progress.chunks(len(place), _CHUNK)):
         pass
     return behind, which

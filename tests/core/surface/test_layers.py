@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from core import Mesh, Settings, reconstruct
+from core import Cancelled, Mesh, Settings, reconstruct
+from core.progress import Progress
 from core.surface.layers import _other_layer, laid_apart
 from core.surface.mesh import edges_of
 from core.surface.triangles import mesh_of
@@ -37,6 +38,14 @@ def test_each_layer_of_a_ball_is_on_its_own_side():
     assert np.abs(np.linalg.norm(apart.vertices, axis=1) - 1).max() < 0.003  # edges of .07 to .1 dip that much
 
 
+def test_stops_when_told_while_it_looks_for_the_other_layer():
+    vertices, quads = uneven(lambda x, y: 0.7 * np.abs(x - SIDE / 2))
+    looks = []
+    with pytest.raises(Cancelled):
+        laid_apart(mesh_of(vertices, quads), 1.0, lambda fraction, _: looks.append(fraction) or fraction < 0.4)
+    assert looks[-1] >= 0.4
+
+
 def test_a_fold_that_pokes_through_the_other_layer_is_taken_back():
     vertices, quads = uneven(lambda x, y: 0.7 * np.abs(x - SIDE / 2))
     sheet = mesh_of(vertices, quads)
@@ -54,7 +63,7 @@ def test_the_other_layer_is_found_as_by_trying_every_face():
     place = random.normal(size=(300, 3))
     place /= np.linalg.norm(place, axis=1, keepdims=True)
     outward = place * np.where(random.random(300) < 0.5, 1, -1)[:, None]
-    behind, face = _other_layer(mesh, place, outward, cell)
+    behind, face = _other_layer(mesh, place, outward, cell, Progress())
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     for at, way, found, which in zip(place, outward, behind, face, strict=True):
@@ -69,7 +78,7 @@ def test_the_other_layer_is_found_as_by_trying_every_face():
 
 
 def test_without_another_layer_nothing_is_cleared():
-    behind, _ = _other_layer(ball(6), np.eye(3), np.eye(3), 0.2)
+    behind, _ = _other_layer(ball(6), np.eye(3), np.eye(3), 0.2, Progress())
     assert np.isinf(behind).all()
 
 
@@ -79,7 +88,7 @@ def crossed(run):
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    behind, _ = _other_layer(mesh, (a + b + c) / 3, normal, run.field.spacing)
+    behind, _ = _other_layer(mesh, (a + b + c) / 3, normal, run.field.spacing, Progress())
     assert np.isfinite(behind).mean() > 0.9
     return ((behind < 0) * mesh.face_areas()).sum() / mesh.face_areas().sum()
 
