@@ -24,12 +24,12 @@ _MESHES = {"none": 0.0, "double": 3.6e-3, "single": 3.6e-3, "both": 6e-3, "signe
 _BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
-# Processor seconds where the probe takes _PROBE of them; fitted to 26 runs over 100 to 100,000 samples, resolutions of
-# 64 to 256, and seven in a band, up to 768: estimates are about .6 to 1.2 of what was taken. Noise: to eight clouds.
+# Processor seconds where the probe takes _PROBE of them; fitted to 41 runs over 500 to 20,000 samples at resolutions of
+# 128 and 256, and 512 in a band: estimates are about .7 to 1.3 of what was taken. Noise: to eight clouds.
 _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
-_NEAR_NODE, _NODE = 2.1e-6, 5e-8
-_BAND_NEAR_NODE, _BAND_NODE = 4.3e-6, 1.5e-6
-_COVER, _SIDES = 2.1e-5, 4e-5  # for a squared cell of the surface: its double cover, and one with its sides told
+_NEAR_NODE, _NODE = 2.4e-6, 5e-8
+_BAND_NEAR_NODE, _BAND_NODE = 4.8e-6, 1.5e-6
+_COVER, _SIDES = 2.9e-5, 5.6e-5  # for a squared cell of the surface: its double cover, and one with its sides told
 _PROBE = 0.00387
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
