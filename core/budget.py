@@ -25,7 +25,7 @@ _BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3} 
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
 # Processor seconds where the probe takes _PROBE of them; fitted to 41 runs over 500 to 20,000 samples at resolutions of
-# 128 and 256, and 512 in a band: estimates are about .7 to 1.3 of what was taken. Noise: to eight clouds.
+# 128 and 256, and 512 in a band: estimates are about .6 to 1.4 of what was taken. Noise: to eight clouds.
 _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
 _NEAR_NODE, _NODE = 2.4e-6, 5e-8
 _BAND_NEAR_NODE, _BAND_NODE = 4.8e-6, 1.5e-6

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from itertools import islice
 
+from .progress import Progress
+
 _AHEAD = 2  # chunks in work or waiting for it, per core
 _HELD = 16  # chunks begun and not yet handed on, per core: those behind a large one go on meanwhile
 _FEW = 2048  # rows, hardly worth a thread
@@ -35,10 +37,11 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def even_size(count: int, most: int) -> int:
-    """Rows of chunks, at most `most`, that `count` rows are cut into so that no core waits for others at the end."""
+def even_chunks(count: int, most: int, progress: Progress) -> Iterator[slice]:
+    """Slices of at most `most` rows that cover `count` in order, so many that no core waits for others at the end; with
+    a report before each, see :meth:`Progress.chunks`."""
     chunks = max(_cores() * -(-count // (_cores() * most)), 1)
-    return min(max(-(-count // chunks), _FEW), most)
+    return progress.chunks(count, min(max(-(-count // chunks), _FEW), most))
 
 
 def _cores():

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..linalg import dots
-from ..parallel import even_size, in_order
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .borders import excess
 from .diffusion import fused_axes, kernel_weights
@@ -88,7 +88,7 @@ def project(surface, x: np.ndarray, progress: Progress, nearest: int = NEAREST) 
     """
     m = len(x)
     found = Projection(np.empty(m), np.empty((m, 3)), np.empty(m, bool), np.empty(m, np.float32))
-    chunks = progress.chunks(m, even_size(m, CHUNK))
+    chunks = even_chunks(m, CHUNK, progress)
     for part, piece in in_order(lambda part: _project(surface, x[part], nearest), chunks):
         found[part] = piece
     return found

@@ -20,7 +20,7 @@ from ..field.grid import CORNERS, Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
-from ..parallel import even_size, in_order
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .first_steps import first_steps
 from .meeting_edges import meeting_edges
@@ -135,7 +135,7 @@ def _whole_cells(band, grid):
 def _vote(band, corner, grid, progress):
     """Edges of cells with corners (c,8), as lower node * 3 + axis (e,), votes that they are crossed, positive if so,
     (e,), and the likely places (e,3)."""
-    chunks = progress.chunks(len(corner), even_size(len(corner), _CHUNK))
+    chunks = even_chunks(len(corner), _CHUNK, progress)
     cast = in_order(lambda part: _ballots(band.step[corner[part]], grid), chunks)
     ballots = zip((np.empty(0),) * 3, *(found for _, found in cast), strict=True)
     number = (3 * corner[:, _EDGES[:, 0]] + _EDGE_AXIS).reshape(-1)

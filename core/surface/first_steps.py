@@ -5,7 +5,7 @@ import numpy as np
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
-from ..parallel import even_size, in_order
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 
 _CHUNK = 1 << 15  # places
@@ -29,7 +29,7 @@ def first_steps(
         row, between = band.between(cells[inside], grid.shape, grid.spacing, off_rims=True)
         return part.start + inside[row], between
 
-    for _, (row, between) in in_order(read, progress.part(0.0, 0.3).chunks(len(x), even_size(len(x), _CHUNK))):
+    for _, (row, between) in in_order(read, even_chunks(len(x), _CHUNK, progress.part(0.0, 0.3))):
         step[row], rest[row] = between, False
     found = surface.project(x[rest], progress.part(0.3, 1.0))
     step[rest], past_rim[rest] = found.step, found.past_rim

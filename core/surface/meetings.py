@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER, TRUSTED, membership
-from ..parallel import even_size, in_order
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 
 NEIGHBOURS = 32
@@ -71,7 +71,7 @@ def _goes_past(i, j, surface):
             past |= above & (np.where(member[row], height, np.inf).min(axis=1) < -limit)
         return past
 
-    chunks = Progress().chunks(len(i), even_size(len(i), _CHUNK))
+    chunks = even_chunks(len(i), _CHUNK, Progress())
     return np.concatenate([np.empty(0, bool), *(past for _, past in in_order(look, chunks))])
 
 
@@ -85,6 +85,6 @@ def _members(surface, own, k, progress):
         between = np.moveaxis(surface.points[near] - surface.points[own[part]][:, None], 2, 0)
         return near, membership(between, surface.normals[own[part]].T, np.moveaxis(surface.normals[near], 2, 0))
 
-    for part, found in in_order(look, progress.chunks(len(own), even_size(len(own), _CHUNK))):
+    for part, found in in_order(look, even_chunks(len(own), _CHUNK, progress)):
         nearest[part], member[part] = found
     return nearest, member

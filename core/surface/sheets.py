@@ -11,7 +11,7 @@ import numpy as np
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import CHUNK, MEMBER, TRUSTED, seen_from, sheet_foot
-from ..parallel import even_size, in_order
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 
 _NEAREST = 16  # samples of a node
@@ -70,7 +70,7 @@ def sheets_near(
     A sheet that a node's neighbour knows and the node itself does not is told to the node.
     """
     progress = Progress.of(progress)
-    chunks = progress.chunks(len(x), even_size(len(x), CHUNK))
+    chunks = even_chunks(len(x), CHUNK, progress)
     found = [sheets for _, sheets in in_order(lambda part: _sheets_of(surface, x, part), chunks)]
     sheets = found[0].joined(*found[1:])
     sheets = _distinct(sheets[np.abs(sheets.tau) <= REACH * cell], surface, len(x), cell)

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.parallel import _FEW, _HELD, even_size, in_order
+from core.parallel import _FEW, _HELD, even_chunks, in_order
+from core.progress import Progress
 
 CORES = os.cpu_count() or 1
 pytestmark = pytest.mark.skipif(CORES < 2, reason="one core works on chunks one after another")
@@ -61,15 +62,17 @@ def test_what_work_raises_comes_out():
 @pytest.mark.parametrize("cores", [1, 2, 3, 16])
 def test_even_chunks_keep_all_cores_at_work_to_the_end(count, cores, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
-    size = even_size(count, 8192)
-    chunks = -(-count // size)
+    parts = list(even_chunks(count, 8192, Progress()))
+    assert np.array_equal(np.concatenate([np.arange(count)[part] for part in parts]), np.arange(count))
+    *_, last = sizes = [part.stop - part.start for part in parts]
+    size, chunks = sizes[0], len(parts)
     assert size <= 8192
-    assert chunks % cores == 0 or size == _FEW
-    assert chunks == 1 or count - (chunks - 1) * size > size - chunks or size == _FEW
+    assert chunks % cores == 0 or size == min(_FEW, count)
+    assert chunks == 1 or last > size - chunks or size == _FEW
 
 
-def test_no_rows_are_one_chunk_of_any_size():
-    assert even_size(0, 8192) > 0
+def test_no_rows_are_no_chunks():
+    assert list(even_chunks(0, 8192, Progress())) == []
 
 
 def test_what_comes_out_does_not_depend_on_the_number_of_cores(monkeypatch):
