@@ -39,7 +39,8 @@ def reconstruct(
 ) -> Reconstruction:
     """Unsigned distance field, normals and surface of a point cloud without normals.
 
-    points      : (n,3) array-like of any scale and place; rows that are not finite and exact duplicates are dropped
+    points      : (n,3) array-like of any scale and place; rows that are not finite, duplicates and near copies of
+                  others are dropped
     constraints : (indices (k,), axes (k,3)), normals to hold fixed at rows of `points`, or None
     progress    : callback (fraction, stage) -> bool or None; False cancels
     normals     : (axes (n,3), confidence (n,)) of all points, as an earlier run found them, or None; with them the
@@ -65,12 +66,13 @@ def reconstruct(
 def _reconstruct(points, settings, constraints, normals, progress):
     stages = _Stages()
     with stages("points"):
-        samples, given = prepare_samples(points), len(np.asarray(points))
+        samples = prepare_samples(points, progress.part(0.0, 0.01, "points"))
+        given = len(np.asarray(points))
 
     with stages("cleaning"):
         cleaning = {}
         if normals is None:
-            samples, cleaning = clean(samples, settings, progress.part(0.0, 0.09, "cleaning"))
+            samples, cleaning = clean(samples, settings, progress.part(0.01, 0.09, "cleaning"))
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
         spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
         grid = fit_grid(samples.points, settings.resolution)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from .cleaning.near_duplicates import find_near_duplicates
 from .errors import InputError
 from .progress import Progress
 
@@ -65,8 +66,9 @@ def real_numbers(given, what: str, wanted: str) -> np.ndarray:
         raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
 
 
-def prepare_samples(points) -> Samples:
-    """Check an (n,3) array-like, drop rows that are not finite and exact duplicates, and scale to the unit frame.
+def prepare_samples(points, progress=None) -> Samples:
+    """Check an (n,3) array-like, drop rows that are not finite, exact duplicates and near copies where there are many
+    (see :mod:`.cleaning.near_duplicates`), and scale to the unit frame.
 
     The centre is the middle of the bounding box, so clouds that differ by an exactly representable shift give the
     same samples bit for bit. Raises :class:`InputError` for a wrong shape or type, fewer than 4 distinct finite
@@ -89,7 +91,14 @@ def prepare_samples(points) -> Samples:
             f"at least {MINIMUM_SAMPLES} are needed for a surface"
         )
 
-    return _framed(points[source_index], source_index, tuple(warnings))
+    samples = _framed(points[source_index], source_index, tuple(warnings))
+    copies = find_near_duplicates(samples.points, progress)
+    if not copies.any():
+        return samples
+    return samples.without(
+        copies,
+        f"{copies.sum()} of {len(copies)} points dropped: near copies of others, less than a fifth of the spacing away",
+    )
 
 
 def _framed(given, source_index, warnings):

@@ -1,0 +1,71 @@
+"""Points that are there twice but for rounding: copies of a scan in another precision, overlapping tiles, corners of
+unwelded triangles.
+
+Bisectors of two such points tell nothing of the surface, and neighbourhoods that are full of them reach no further than
+the next few places. In a random cloud the points with another within a share q of the spacing grow as q^2, or as q
+along lines, so within q there are few of those within 4 q; of copies there are nearly all.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from ..progress import Progress
+
+_CLOSE = 0.01, 0.05, 0.1  # local spacings, within which most copies may lie
+_WIDER, _MOST = 4.0, 0.6  # there are some if, of points with another so much wider around, this share has it that close
+_LEAST = 0.01  # and if this share of all points has; of random points .008 have one within a twentieth
+_MERGED = 2.0  # times as far, the other copies may lie
+_NEIGHBOURS = 16
+_TRIED = 4096  # points that are looked at first
+_CHUNK = 16384  # points
+
+
+def find_near_duplicates(points: np.ndarray, progress=None) -> np.ndarray:
+    """(n,) bool: which of distinct points (n,3) float64 are copies of earlier ones, at most a fifth of the local spacing
+    away; none where close points are no more than chance leaves.
+
+    The local spacing here is the side of the square that each of a point's 16 nearest has to itself.
+    """
+    progress, kept = Progress.of(progress), np.arange(len(points))
+    while len(kept) > _NEIGHBOURS:
+        tree = KDTree(points[kept])
+        close = _closeness(tree)
+        if close is None:
+            break
+        kept = kept[_first_of_clusters(tree, _MERGED * close, progress)]
+    copies = np.ones(len(points), bool)
+    copies[kept] = False
+    return copies
+
+
+def _closeness(tree):
+    """Local spacings within which most copies lie, None where there are none."""
+    tried = np.linspace(0, tree.n - 1, min(_TRIED, tree.n)).astype(np.int64)
+    distance, _, spacing = _neighbours(tree, tried)
+    nearest = distance[:, 1] / spacing
+    for close in _CLOSE:
+        share = (nearest < close).mean()
+        if share > max(_LEAST, _MOST * (nearest < _WIDER * close).mean()):
+            return close
+    return None
+
+
+def _first_of_clusters(tree, reach, progress):
+    """The first rows, (m,) ascending, of the points that pairs closer than `reach` local spacings connect."""
+    ends = []
+    for part in progress.chunks(tree.n, _CHUNK):
+        rows = np.arange(part.start, part.stop)
+        distance, other, spacing = _neighbours(tree, rows)
+        row, column = np.nonzero(distance < reach * spacing[:, None])
+        ends.append((rows[row], other[row, column]))
+    ends = tuple(np.concatenate(each) for each in zip(*ends, strict=True))
+    links = coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(tree.n, tree.n))
+    return np.sort(np.unique(connected_components(links, directed=False)[1], return_index=True)[1])
+
+
+def _neighbours(tree, rows):
+    """Distances to a point itself and its 16 nearest, (m,17), which they are, and the local spacing, (m,)."""
+    distance, other = tree.query(tree.data[rows], k=_NEIGHBOURS + 1, workers=-1)
+    return distance, other, distance[:, -1] * np.sqrt(np.pi / _NEIGHBOURS)
