@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from .cleaning.near_duplicates import find_near_duplicates
 from .errors import InputError
+from .near_duplicates import find_near_duplicates
 from .progress import Progress
 
 MINIMUM_SAMPLES = 4
@@ -68,7 +68,7 @@ def real_numbers(given, what: str, wanted: str) -> np.ndarray:
 
 def prepare_samples(points, progress=None) -> Samples:
     """Check an (n,3) array-like, drop rows that are not finite, exact duplicates and near copies where there are many
-    (see :mod:`.cleaning.near_duplicates`), and scale to the unit frame.
+    (see :mod:`.near_duplicates`), and scale to the unit frame.
 
     The centre is the middle of the bounding box, so clouds that differ by an exactly representable shift give the
     same samples bit for bit. Raises :class:`InputError` for a wrong shape or type, fewer than 4 distinct finite

@@ -7,7 +7,7 @@ stand off the plane of its neighbours, or lie among samples that form no surface
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
+from scipy.spatial import ConvexHull, KDTree
 
 from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
@@ -31,7 +31,8 @@ _STRAIGHT = 0.98  # least cosine to the direction of a line
 _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
 _DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
-_SMALL_PART = 0.02  # of all samples
+_SMALL_PART, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part
+_SHELL = 24, 0.9, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
 
 _DIRTY = 0.005  # share of strays from which on those close to the surface are looked for as well
 _STRICT = 0.7  # share of the limits above that then holds for those beside a surface
@@ -47,7 +48,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - scattered: sparse against the whole cloud, where most sparse samples around form no surface;
     - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
       as sparse, which may be a wire sampled less;
-    - detached: in a small part of its own that is a cloud rather than a sheet;
+    - detached: in a small part of its own that is a cloud rather than a sheet or the shell of a convex body;
     - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
     """
     progress = Progress.of(progress)
@@ -157,7 +158,19 @@ class _Surroundings:
         count, part = connected_components(links, directed=False)
         size = np.bincount(part, minlength=count)
         thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
-        return (thick & (size < _SMALL_PART * len(self.points)))[part]
+        clouds = thick & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
+        for number in np.flatnonzero(clouds & (size >= _SHELL[0])):
+            row = np.flatnonzero(part == number)
+            clouds[number] = not _is_shell(self.points[row], self.spacing[row])
+        return clouds[part]
+
+
+def _is_shell(points, spacing):
+    """Whether nearly all of a part's points (m,3) lie on its convex hull."""
+    _, most, near = _SHELL
+    faces = ConvexHull(points, qhull_options="QJ").equations
+    depth = -(points @ faces[:, :3].T + faces[:, 3]).max(axis=1)
+    return (depth < near * spacing).mean() >= most
 
 
 def _cosines(a, b):

@@ -90,6 +90,23 @@ def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
     assert not find_outliers(with_strays(flat)[0]).any()
 
 
+@pytest.mark.parametrize("count", [24, 60])
+def test_a_small_closed_body_of_its_own_stays(count):
+    rng, half = np.random.default_rng(2), 0.012 * np.sqrt(count)
+    box = rng.uniform(-half, half, (count, 3))
+    box[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-half, half], count)
+    for body in (box, half * shapes.scattered_sphere(count)):
+        points, _ = with_strays(body + [2, 0, 0])
+        assert not find_outliers(points)[-count:].any()
+
+
+def test_of_many_small_bodies_none_goes():
+    rng = np.random.default_rng(4)
+    bodies = [0.2 * shapes.scattered_sphere(12, seed) + [seed % 8, seed // 8, 0] for seed in range(64)]
+    bodies = [body * [1, rng.uniform(0.5, 1), 1] for body in bodies]
+    assert not find_outliers(np.vstack(bodies)).any()
+
+
 @pytest.mark.parametrize("far", [3.0, 1e3, 1e6])
 def test_one_far_sample_is_found(far):
     points, stray = with_strays(np.array([[far, 0, 0]]))

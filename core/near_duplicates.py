@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from ..progress import Progress
+from .progress import Progress
 
 _CLOSE = 0.01, 0.05, 0.1  # local spacings, within which most copies may lie
 _WIDER, _MOST = 4.0, 0.6  # there are some if, of points with another so much wider around, this share has it that close
@@ -23,8 +23,8 @@ _CHUNK = 16384  # points
 
 
 def find_near_duplicates(points: np.ndarray, progress=None) -> np.ndarray:
-    """(n,) bool: which of distinct points (n,3) float64 are copies of earlier ones, at most a fifth of the local spacing
-    away; none where close points are no more than chance leaves.
+    """(n,) bool: which of distinct points (n,3) float64 are copies of earlier ones, at most a fifth of the local
+    spacing away; none where close points are no more than chance leaves.
 
     The local spacing here is the side of the square that each of a point's 16 nearest has to itself.
     """

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.cleaning.near_duplicates import find_near_duplicates
+from core.near_duplicates import find_near_duplicates
 from core.points import prepare_samples
 from tests import shapes
 
