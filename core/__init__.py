@@ -8,7 +8,7 @@ from importlib import import_module
 _PUBLIC = {
     "cleaning.outliers": ("remove_outliers",),
     "cleaning.positions": ("denoise",),
-    "errors": ("Cancelled", "InputError", "MissingDependency", "SettingsError", "VADError"),
+    "errors": ("Cancelled", "InputError", "MemoryBudgetError", "MissingDependency", "SettingsError", "VADError"),
     "field.distance_field": ("BandedField", "DistanceField"),
     "field.grid": ("fit_grid",),
     "field.integration": ("distance_field",),

@@ -3,16 +3,19 @@
 import os
 import sys
 
-from .cli import BAD_INPUT, main
-
 if sys.stdout is not None:
     sys.stdout.reconfigure(errors="backslashreplace")  # file names need not be text
 try:
+    from .cli import main
+
     status = main()
     if sys.stdout is not None:
         sys.stdout.flush()
+except KeyboardInterrupt:  # while modules are loaded
+    sys.stderr.write("error: cancelled\n")
+    status = 130
 except OSError as error:  # what is printed goes to a full disk, or nobody reads it; all files are written by then
     sys.stderr.write(f"error: standard output cannot be written to ({error.strerror}); check where it goes\n")
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    status = BAD_INPUT
+    status = 2
 sys.exit(status)

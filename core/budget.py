@@ -10,7 +10,8 @@ from scipy.spatial import KDTree
 
 from .errors import MemoryBudgetError
 from .field.grid import Grid
-from .settings import BESIDE_OFFSET, WITH_SIDES, Settings, options
+from .parallel import cores
+from .settings import BESIDE_OFFSET, WITH_SIDES, Settings
 
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 _BAND = 4.0  # cells, the band that is advised at least
@@ -18,6 +19,9 @@ _BAND = 4.0  # cells, the band that is advised at least
 # Measured on 86 runs over 100 to 200,000 samples, resolutions of 64 to 512: the Voronoi diagram by samples, the field
 # by nodes, the meshes by nodes and by squared cells of the surface. One is over before the next begins.
 _MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 45.0, "node": 31e-6, "meshes": 55.0, "held node": 8e-6}  # MiB
+_ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
+_POISSON_NODE = 40e-6  # MiB
+_CORE = 15.0  # MiB that each core beyond two holds in chunks
 _MESHES = {"none": 0.0, "double": 3.6e-3, "single": 3.6e-3, "both": 6e-3, "signed": 3.6e-3}
 
 # The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
@@ -47,7 +51,7 @@ class Estimate:
 
 def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False) -> Estimate:
     """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
-    settings the resolution, the band and the kind of surface count.
+    settings the resolution, the band, the kind of surface and, for the memory, solver and integration count.
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
     """
@@ -78,18 +82,24 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
         return ()
     if estimate.memory_mb <= limit:
         return (f"estimated at {estimate.memory_mb:.0f} MiB, of {limit:.0f} MiB that may be used",)
-    least = options()["resolution"].metadata["limits"][0]
-    area, coarser = float(np.sum((spacing / grid.spacing) ** 2)), range(settings.resolution - 1, least - 1, -1)
+    area = float(np.sum((spacing / grid.spacing) ** 2))
+    coarser = range(settings.resolution - 1, settings.coarsest - 1, -1)
     if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
         band = _fitting_band(len(spacing), area, limit, settings)
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
-    else:
-        fitting = max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))
+    elif len(spacing) > (fitting := max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))):
         remedy = f"thin the {len(spacing)} points to {fitting} or fewer, or raise memory_limit"
+    else:
+        remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
     raise MemoryBudgetError(
         f"resolution {settings.resolution} needs about {estimate.memory_mb:.0f} MiB; "
         f"{limit:.0f} MiB may be used; {remedy}"
     )
+
+
+def advised_band(offset: float) -> float:
+    """Cells of a band that holds what is mostly needed of the field, for a cover at `offset` cells."""
+    return max(_BAND, offset + BESIDE_OFFSET)
 
 
 def free_memory_mb() -> float:
@@ -101,13 +111,16 @@ def free_memory_mb() -> float:
 
 def _memory(samples, area, nodes, settings):
     """MiB of a run over a surface of `area` squared cells: of its most costly stage."""
-    diagram = _MEMORY["diagram"] + _MEMORY["sample"] * samples
+    diagram, by_cores = _MEMORY["diagram"] + _MEMORY["sample"] * samples, _CORE * max(0, cores() - 2)
+    if settings.solver == "energy":
+        diagram = _MEMORY["diagram"] + _ENERGY["sample"] * samples + _ENERGY["torch"] * (settings.backend != "numpy")
     if settings.band is not None:
         kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
-        return max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
-    field = _MEMORY["field"] + _MEMORY["node"] * nodes
+        return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
+    node = _POISSON_NODE if settings.integration == "poisson" else _MEMORY["node"]
+    field = _MEMORY["field"] + node * nodes
     meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _MESHES[settings.surface] * area
-    return max(diagram, field, meshes)
+    return by_cores + max(diagram, field, meshes)
 
 
 def _memory_at(resolution, samples, area, grid, settings):
@@ -121,21 +134,24 @@ def _fitting_band(samples, area, limit, settings):
     """The advice to set a band, where that is possible and fits."""
     if settings.band is not None or settings.integration != "transport":
         return ""
-    in_band = replace(settings, band=max(_BAND, settings.offset + BESIDE_OFFSET))
+    in_band = replace(settings, band=advised_band(settings.offset))
     return f", set band to {in_band.band:g}" if _memory(samples, area, 0, in_band) <= limit else ""
 
 
 def _probe():
     """Processor seconds of a small fixed piece of the usual work, the least of three, and how many times as long the
-    three took by the clock as of the processor, which other work on the machine makes more."""
+    three took by the clock as of the processor, which other work on the machine makes more. Where the processor's
+    seconds are counted in larger pieces than that, as on Windows, both by the clock."""
     points = np.random.default_rng(0).random((1500, 3))
-    begun, took = time.perf_counter(), []
+    times = [(time.perf_counter(), time.thread_time())]
     for _ in range(3):
-        start = time.thread_time()
         distance, index = KDTree(points).query(points, k=16)
         np.exp(-np.einsum("nki,nki->nk", points[index], points[index]) * distance).sum()
-        took.append(time.thread_time() - start)
-    return min(took), max(1.0, (time.perf_counter() - begun) / sum(took))
+        times.append((time.perf_counter(), time.thread_time()))
+    by_clock, of_processor = np.diff(times, axis=0).T
+    if not of_processor.min() > 0:
+        return by_clock.min(), by_clock.mean() / by_clock.min()
+    return of_processor.min(), max(1.0, by_clock.sum() / of_processor.sum())
 
 
 def _linux_available():

@@ -23,7 +23,7 @@ from .io.points import READERS, read_points, read_scan
 from .io.report import report_json, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
-from .points import local_spacing, prepare_samples
+from .points import first_of_each, local_spacing, prepare_samples
 from .reconstruction import Reconstruction
 from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
@@ -62,7 +62,8 @@ files in the folder OUT, named after the scan, each written whole or not at all:
   SCAN.json        settings, counts, seconds, warnings; written last
 All are in the scan's own units and place. Vertices of meshes have the properties distance (how far off the surface)
 and confidence (of the nearest sample); where SCAN is a .ply, meshes and points also carry what its points do: colours
-(red, green, blue), intensity and every other property that is one number.
+(red, green, blue), intensity and every other property that is one number, with scan_ before its name where it has one
+of those two.
 """
 
 
@@ -80,8 +81,14 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(error, TOO_LARGE, arguments)
     except VADError as error:
         return _fail(error, BAD_INPUT, arguments)
+    except MemoryError as error:
+        return _fail(f"out of memory ({error}); use a lower resolution, a band or fewer points", TOO_LARGE, arguments)
     except KeyboardInterrupt:
         return _fail("cancelled", CANCELLED, arguments)
+    except OSError as error:
+        if error.filename is None:  # standard output cannot be written to
+            raise
+        return _fail(f"{error.filename}: {error.strerror}; see that it is there and yours", BAD_INPUT, arguments)
     finally:
         signal.signal(signal.SIGTERM, previous)
 
@@ -144,7 +151,7 @@ def _add_settings(parser, fields):
         if word:
             allowed += f", or {word}"
         parser.add_argument(
-            f"--{name.replace('_', '-')}",
+            *dict.fromkeys((f"--{name.replace('_', '-')}", f"--{name}")),
             metavar="INT" if field.type is int else "FLOAT" if limits else "STR",
             type=_number if limits else str,
             default=field.default,
@@ -226,6 +233,9 @@ def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
 
     summary = folder / f"{scan.stem}{_REPORT}"
     report = {**result.report, "scan": scan, "files": [], "warnings": list(result.report["warnings"])}
+    for ending in (_VOLUME, *_MESHES.values(), _ARRAYS):
+        if ending not in writers and (path := folder / f"{scan.stem}{ending}").exists():
+            report["warnings"].append(f"{path} is not of this run, which does not write it")
     for ending, write in writers.items():
         path = folder / f"{scan.stem}{ending}"
         try:
@@ -254,7 +264,8 @@ def _info(given):
     samples = prepare_samples(points)
     nearest = KDTree(samples.points).query(samples.points, k=2, workers=-1)[0][:, 1] * samples.scale
     used = points[samples.source_index]
-    finite = int(np.isfinite(points).all(axis=1).sum())
+    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    distinct = len(first_of_each(points, finite))
     low, high = used.min(axis=0), used.max(axis=0)
     grid = fit_grid(used, settings.resolution)
     spacing = local_spacing(samples.points)
@@ -263,8 +274,9 @@ def _info(given):
     facts = {
         "scan": given.scan,
         "points": len(points),
-        "not_finite": len(points) - finite,
-        "duplicates": finite - len(used),
+        "not_finite": len(points) - len(finite),
+        "duplicates": len(finite) - distinct,
+        "near_copies": distinct - len(used),
         "box": {"low": low, "high": high, "size": high - low},
         "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
         "spacing": np.median(spacing),
@@ -284,7 +296,8 @@ def _described(facts):
     cost = facts["estimate"]
     band = "" if facts["band"] is None else f", those within {facts['band']:g} cells of the surface alone"
     return (
-        f"points   {facts['points']}, of which {facts['not_finite']} not finite and {facts['duplicates']} duplicates\n"
+        f"points   {facts['points']}, of which {facts['not_finite']} not finite, {facts['duplicates']} duplicates and "
+        f"{facts['near_copies']} near copies of others\n"
         f"box      {low} to {high}, size {size}\n"
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"

@@ -25,4 +25,4 @@ class Cancelled(VADError):
 
 
 class MemoryBudgetError(VADError, MemoryError):
-    """A run that would need more memory than it may have; nothing was started."""
+    """A run that would need more memory than it may have; refused before its costly stages."""

@@ -26,7 +26,7 @@ def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Trigonometric solution of the characteristic cubic (O. K. Smith, Comm. ACM 4(4), 1961). Every column of the adjugate
     of A - lambda_1 I is along the axis; the one with the largest diagonal element is the longest. Where the two largest
-    eigenvalues coincide any axis of their plane may come back; a multiple of the identity gives the x axis.
+    eigenvalues coincide any axis of their plane may come back; a multiple of the identity gives any.
     """
     xx, yy, zz, xy, xz, yz = np.ascontiguousarray(tensors.T)
     mean = (xx + yy + zz) / 3

@@ -14,8 +14,8 @@ from scipy.spatial import KDTree
 from .progress import Progress
 
 _CLOSE = 0.01, 0.05, 0.1  # local spacings, within which most copies may lie
-_WIDER, _MOST = 4.0, 0.6  # there are some if, of points with another so much wider around, this share has it that close
-_LEAST = 0.01  # and if this share of all points has; of random points .008 have one within a twentieth
+_WIDER, _MOST = 4.0, 0.7  # there are some if, of points with another so much wider around, this share has it that close
+_LEAST, _FEWEST = 0.01, 8  # and if this share of all points has, and so many; of random ones .008 within a twentieth
 _MERGED = 2.0  # times as far, the other copies may lie
 _NEIGHBOURS = 16
 _TRIED = 4096  # points that are looked at first
@@ -46,8 +46,8 @@ def _closeness(tree):
     distance, _, spacing = _neighbours(tree, tried)
     nearest = distance[:, 1] / spacing
     for close in _CLOSE:
-        share = (nearest < close).mean()
-        if share > max(_LEAST, _MOST * (nearest < _WIDER * close).mean()):
+        paired, around = (nearest < close).sum(), (nearest < _WIDER * close).sum()
+        if paired >= max(_FEWEST, _LEAST * len(tried), _MOST * around):
             return close
     return None
 

@@ -11,6 +11,7 @@ from .progress import Progress
 _AHEAD = 2  # chunks in work or waiting for it, per core
 _HELD = 16  # chunks begun and not yet handed on, per core: those behind a large one go on meanwhile
 _FEW = 2048  # rows, hardly worth a thread
+_MOST_CORES = 8  # more hardly gain, and each holds chunks in memory
 
 
 def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
@@ -19,12 +20,12 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
     Threads serve, since NumPy and SciPy let go of the interpreter in their loops. What an iterator of `chunks` does
     (report progress, cancel) happens in the caller's thread; when it raises, no thread is left.
     """
-    cores, chunks, begun = _cores(), iter(chunks), deque()
-    with ThreadPoolExecutor(cores) as pool:
+    at_once, chunks, begun = cores(), iter(chunks), deque()
+    with ThreadPoolExecutor(at_once) as pool:
         try:
             while True:
                 busy = [result for _, result in begun if not result.done()]
-                fresh = min(cores * _AHEAD - len(busy), cores * _HELD - len(begun))
+                fresh = min(at_once * _AHEAD - len(busy), at_once * _HELD - len(begun))
                 begun += [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, fresh)]
                 if not begun:
                     return
@@ -40,9 +41,10 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
 def even_chunks(count: int, most: int, progress: Progress) -> Iterator[slice]:
     """Slices of at most `most` rows that cover `count` in order, so many that no core waits for others at the end; with
     a report before each, see :meth:`Progress.chunks`."""
-    chunks = max(_cores() * -(-count // (_cores() * most)), 1)
+    chunks = max(cores() * -(-count // (cores() * most)), 1)
     return progress.chunks(count, min(max(-(-count // chunks), _FEW), most))
 
 
-def _cores():
-    return os.cpu_count() or 1
+def cores() -> int:
+    """How many chunks are worked on at a time."""
+    return min(os.cpu_count() or 1, _MOST_CORES)

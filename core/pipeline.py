@@ -57,8 +57,10 @@ def reconstruct(
     True
 
     Raises :class:`InputError` for points or constraints that cannot be used and for the signed surface of a shape that
-    is not closed, :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled`
-    where `progress` says so.
+    is not closed, :class:`MemoryBudgetError` where the run would need more memory than it may have, once the points are
+    cleaned, :class:`SettingsError` for a device that is not there and for grid diffusion over too many nodes,
+    :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled` where `progress`
+    says so.
     """
     return watched(partial(_reconstruct, points, settings, constraints, normals), progress)
 

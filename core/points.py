@@ -49,7 +49,7 @@ class Samples:
         stay exactly as given."""
         stirred = (points != self.points).any(axis=1)[:, None]
         points = np.rint(points / _QUANTUM) * _QUANTUM
-        kept = _first_of_each(points, np.arange(len(points)))
+        kept = first_of_each(points, np.arange(len(points)))
         given = np.where(stirred, self.to_input_units(points), self.given)
         return replace(self, points=points[kept], given=given[kept], source_index=self.source_index[kept])
 
@@ -66,6 +66,25 @@ def real_numbers(given, what: str, wanted: str) -> np.ndarray:
         raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
 
 
+def points_array(given, what: str = "points") -> np.ndarray:
+    """An array-like of points as (n,3) float64. Raises :class:`InputError` for another shape or other than numbers."""
+    points = real_numbers(given, what, "an (n,3) array")
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"{what} have shape {points.shape}; give an (n,3) array of x, y, z")
+    return points
+
+
+def finite_points(given, least: int = 0) -> np.ndarray:
+    """The same of points that are all finite, at `least` so many; raises :class:`InputError` otherwise."""
+    points = points_array(given)
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():
+        raise InputError(f"{(~finite).sum()} of {len(points)} points are not finite; leave them out")
+    if len(points) < least:
+        raise InputError(f"{len(points)} points given; at least {least} are needed")
+    return points
+
+
 def prepare_samples(points, progress=None) -> Samples:
     """Check an (n,3) array-like, drop rows that are not finite, exact duplicates and near copies where there are many
     (see :mod:`.near_duplicates`), and scale to the unit frame.
@@ -74,15 +93,11 @@ def prepare_samples(points, progress=None) -> Samples:
     same samples bit for bit. Raises :class:`InputError` for a wrong shape or type, fewer than 4 distinct finite
     points, or points on one line (a plane is fine).
     """
-    points = real_numbers(points, "points", "an (n,3) array")
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points have shape {points.shape}; give an (n,3) array of x, y, z")
-
-    warnings = []
+    points, warnings = points_array(points), []
     finite = np.flatnonzero(np.isfinite(points).all(axis=1))
     if len(finite) < len(points):
         warnings.append(f"{len(points) - len(finite)} of {len(points)} points dropped: NaN or infinite coordinates")
-    source_index = _first_of_each(points, finite)
+    source_index = first_of_each(points, finite)
     if len(source_index) < len(finite):
         warnings.append(f"{len(finite) - len(source_index)} exact duplicates dropped")
     if len(source_index) < MINIMUM_SAMPLES:
@@ -113,7 +128,7 @@ def _framed(given, source_index, warnings):
         )
     centre = low + (high - low) / 2
     points = np.rint((given - centre) / (scale * _QUANTUM)) * _QUANTUM
-    distinct = _first_of_each(points, np.arange(len(points)))
+    distinct = first_of_each(points, np.arange(len(points)))
     if len(distinct) < len(points):
         warnings = (
             *warnings,
@@ -132,7 +147,9 @@ def _framed(given, source_index, warnings):
 
 
 def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
-    """rho, (n,) float64 in the units of `points`: mean distance of each sample to its 6 nearest (fewer if n < 7)."""
+    """rho, (n,) float64 in the units of `points`, (n,3) array-like: mean distance of each sample to its 6 nearest
+    (fewer if n < 7). Raises :class:`InputError` for fewer than two points, or any that are not finite."""
+    points = finite_points(points, least=2)
     k = min(SPACING_NEIGHBOURS, len(points) - 1)
     tree, spacing = KDTree(points), np.empty(len(points))
     for part in Progress.of(progress).chunks(len(points), _CHUNK):
@@ -140,7 +157,7 @@ def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
     return spacing
 
 
-def _first_of_each(points, rows):
+def first_of_each(points, rows):
     """The rows (ascending) that hold the first occurrence of each distinct point; -0.0 equals 0.0."""
     x, y, z = (points[rows] + 0.0).T
     order = np.lexsort((rows, z, y, x))

@@ -122,8 +122,8 @@ class Settings:
     )
     memory_limit: float = _option(
         "auto",
-        "A run that would need more memory than this is refused before it starts. With auto the limit is 70 % of the "
-        "memory that is free",
+        "A run that would need more memory than this is refused once its points are cleaned. With auto the limit is "
+        "70 % of the memory that is free",
         limits=(64.0, 2.0**22),
         word="auto",
         unit="MiB",
@@ -153,18 +153,23 @@ class Settings:
                 f"band is {self.band:g} and offset {self.offset:g}; use a band of {self.offset + BESIDE_OFFSET:g} or "
                 "more, or lower the offset"
             )
-        room = padding_cells(self.resolution)
-        if self.offset > room and self.surface not in ("none", "signed"):
+        if self.resolution < self.coarsest:
+            room = padding_cells(self.resolution)
             raise SettingsError(
                 f"offset is {self.offset:g} and resolution {self.resolution}, which leaves {room:g} cells around the "
-                f"points; use an offset of {room:g} or less, or a resolution of {ceil(self.offset / padding_cells(1))} "
-                "or more"
+                f"points; use an offset of {room:g} or less, or a resolution of {self.coarsest} or more"
             )
         if self.diffusion == "grid" and self.integration != "poisson":
             raise SettingsError(
                 f"diffusion is 'grid' and integration {self.integration!r}, which needs no directions away from the "
                 "surface; use integration='poisson' with it, or diffusion='kernel'"
             )
+
+    @property
+    def coarsest(self) -> int:
+        """The least resolution whose box has room for the iso-surface at `offset`, where there is to be one."""
+        least = options()["resolution"].metadata["limits"][0]
+        return least if self.surface in ("none", "signed") else max(least, ceil(self.offset / padding_cells(1)))
 
 
 def options() -> dict[str, dataclasses.Field]:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.budget import estimate_cost
+from ..core.budget import advised_band, estimate_cost
+from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
 from ..core.points import local_spacing, prepare_samples
@@ -16,19 +17,21 @@ from .properties import chosen, settings_from
 
 @dataclass(frozen=True)
 class Points:
-    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, and the factor that
-    takes these lengths to scene units."""
+    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, the factor that takes
+    these lengths to scene units, and whether the samples look noisy."""
 
     corners: np.ndarray
     spacing: np.ndarray
     scale: float
+    noisy: bool
 
     @classmethod
     def of(cls, points: np.ndarray) -> "Points":
         """Those of (n,3) points. Raises :class:`InputError` for points that cannot be used."""
         samples = prepare_samples(points)
         corners = np.stack([samples.points.min(axis=0), samples.points.max(axis=0)])
-        return cls(corners, local_spacing(samples.points), samples.scale)
+        spacing = local_spacing(samples.points)
+        return cls(corners, spacing, samples.scale, looks_noisy(samples.points, spacing))
 
     def suits(self) -> int:
         """The resolution at which a cell is as large as the points are apart."""
@@ -38,7 +41,8 @@ class Points:
 
     def cost(self, settings: Settings) -> list[str]:
         """Lines on these points and on the time and memory that `settings` would take."""
-        estimate = estimate_cost(self.spacing, fit_grid(self.corners, settings.resolution), settings)
+        noisy = self.noisy if settings.denoise == "auto" else settings.denoise > 0
+        estimate = estimate_cost(self.spacing, fit_grid(self.corners, settings.resolution), settings, noisy)
         return [
             f"{len(self.spacing):,} points, {np.median(self.spacing) * self.scale:.3g} apart",
             f"Suits: resolution {self.suits()}",
@@ -109,7 +113,7 @@ class VAD_OT_estimate(bpy.types.Operator):
 
 class VAD_OT_use_resolution(bpy.types.Operator):
     """Take the resolution at which a cell is as large as the points are apart: finer ones show hardly more detail.
-    Where the whole box would be too much, take a band of 4 cells, too"""
+    Where the whole box would be too much, take a band, too"""
 
     bl_idname = "vad.use_resolution"
     bl_label = "Use It"
@@ -123,8 +127,8 @@ class VAD_OT_use_resolution(bpy.types.Operator):
     def execute(self, context):
         stored = context.scene.vad
         stored.resolution = suits()
-        if suits() > WHOLE_BOX and stored.band == "none":
-            stored.band = "4"
+        if suits() > WHOLE_BOX and stored.band == "none" and stored.integration == "transport":
+            stored.band = f"{advised_band(stored.offset):g}"
         return {"FINISHED"}
 
 

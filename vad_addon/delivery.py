@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import VADError
-from . import datablocks, materials, overlay, results, stored_field, volume_files
+from . import datablocks, materials, overlay, results, shapes, stored_field, volume_files
 from .attributes import Attribute
 from .outcome import Outcome
 from .points_in import Source, object_of
@@ -58,6 +58,7 @@ def deliver(
     _show_mesh_first(scene, collection, stays)
     _colour(set(collection.objects) - before, source)
     if results.FIELD in made:
+        shapes.follow(collection)
         materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell, outcome.shape)
     if results.member(collection, results.FIELD) is not None:
         made_from = overlay.samples_of(made[results.SAMPLES])[:3]

@@ -67,9 +67,11 @@ class Job:
         self._output = open(output, "rb")  # noqa: SIM115  read bit by bit, closed by stop()
 
     def poll(self) -> bool:
-        """Take in what the worker said since; True once it has ended."""
+        """Take in what the worker said since, but for what libraries print there; True once it has ended."""
         ended = self._process.poll() is not None
         for line in self._complete_lines():
+            if not line.startswith(b"{"):
+                continue
             facts = json.loads(line)
             self._error = facts.get("error", self._error)
             self.fraction, self.stage = facts.get("fraction", self.fraction), facts.get("stage", self.stage)

@@ -7,6 +7,7 @@ from ..core.errors import InputError
 from . import materials, overlay, results
 
 SHELL, SLICE, NORMALS = "shell", "slice", "normals"  # roles
+_GRID_BY_NAME = "GeometryNodeGetNamedGrid"
 _SLICE_STEPS = 256  # faces along each side of a slice
 
 
@@ -52,6 +53,19 @@ def normals(collection: bpy.types.Collection, length: float, thickness: float, e
     widths = curves.attributes.get("radius") or curves.attributes.new("radius", "FLOAT", "POINT")
     widths.data.foreach_set("value", np.repeat(0.5 * thickness * radius[rows], 2).astype(np.float32))
     return _object(curves.name, curves, NORMALS, collection, samples)
+
+
+def follow(collection: bpy.types.Collection) -> None:
+    """Let shells and slices read the distances of the collection's volume, which signed ones have another name for."""
+    field = results.member(collection, results.FIELD)
+    for obj in collection.objects:
+        for modifier in obj.modifiers if field is not None else ():
+            if results.role(obj) == SHELL and modifier.type == "VOLUME_TO_MESH":
+                modifier.grid_name = _distances(field)
+            elif results.role(obj) == SLICE and modifier.type == "NODES" and modifier.node_group is not None:
+                for node in modifier.node_group.nodes:
+                    if node.bl_idname == _GRID_BY_NAME:
+                        node.inputs["Name"].default_value = _distances(field)
 
 
 def _field(collection):
@@ -117,7 +131,7 @@ def _slice_nodes(field, axis):
                 socket.default_value = given
         return made.outputs
 
-    volume, grid = node("GeometryNodeObjectInfo", 0), node("GeometryNodeGetNamedGrid", 1)
+    volume, grid = node("GeometryNodeObjectInfo", 0), node(_GRID_BY_NAME, 1)
     volume.transform_space = "RELATIVE"
     volume.inputs["Object"].default_value = field
     grid.inputs["Name"].default_value = _distances(field)

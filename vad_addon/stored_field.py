@@ -29,13 +29,14 @@ def suffices(settings: Settings) -> bool:
 
 
 def distances(path: Path, shape: tuple[int, int, int]) -> np.ndarray:
-    """(nx,ny,nz) float32 distances at the nodes, in input units.
+    """(nx,ny,nz) float32 unsigned distances at the nodes, in input units, of a file that holds these or signed ones.
 
     Raises :class:`VADError` where the file cannot be read.
     """
-    values = np.empty(shape, np.float32)
+    values, openvdb = np.empty(shape, np.float32), load_openvdb()
     try:
-        load_openvdb().read(str(path), "udf").copyToArray(values)
+        names = {grid.name for grid in openvdb.readAllGridMetadata(str(path))}
+        openvdb.read(str(path), "sdf" if "sdf" in names else "udf").copyToArray(values)
     except (OSError, LookupError, RuntimeError, ValueError) as error:
         raise VADError(f"{path} cannot be read ({error}): reconstruct again") from error
-    return values
+    return np.abs(values, out=values)

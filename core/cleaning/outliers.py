@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree
 
-from ..points import SPACING_NEIGHBOURS
+from ..points import SPACING_NEIGHBOURS, finite_points
 from ..progress import Progress
 from .quadrics import fit_quadrics
 
@@ -51,7 +51,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - detached: in a small part of its own that is a cloud rather than a sheet or the shell of a convex body;
     - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
     """
-    progress = Progress.of(progress)
+    progress, points = Progress.of(progress), finite_points(points)
     stray = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
         return stray
@@ -75,7 +75,11 @@ def find_outliers(points, progress=None) -> np.ndarray:
 
 
 def remove_outliers(points, progress=None) -> tuple[np.ndarray, np.ndarray]:
-    """The samples (n',3) of (n,3) that are no strays, and their rows (n',) int64, see :func:`find_outliers`."""
+    """The samples (n',3) of (n,3) that are no strays, and their rows (n',) int64, see :func:`find_outliers`.
+
+    Raises :class:`InputError` for points that are not finite.
+    """
+    points = finite_points(points)
     kept = np.flatnonzero(~find_outliers(points, progress))
     return points[kept], kept
 

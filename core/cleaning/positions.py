@@ -6,6 +6,7 @@ noise breaks first. Robust quadrics through the neighbours need no diagram, and 
 
 import numpy as np
 
+from ..points import finite_points
 from ..progress import Progress
 from .noise import LADDER, estimate_noise, noisy_samples
 from .quadrics import fit_quadrics
@@ -24,17 +25,17 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     strength : "auto" moves the samples that are found noisy; a number in [0,1] moves all this share of the way (0 none)
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
-    nothing is to do.
+    nothing is to do. Raises :class:`InputError` for points that are not finite.
     """
-    progress = Progress.of(progress)
+    progress, given, points = Progress.of(progress), points, finite_points(points)
     if len(points) <= LADDER[0]:
-        return points, {}
+        return given, {}
     if strength == "auto":
         noisy, strength = noisy_samples(points, spacing, seed, progress.part(0.0, 0.1)), 1.0
     else:
         noisy = np.full(len(points), strength > 0)
     if not noisy.any():
-        return points, {}
+        return given, {}
     noise = estimate_noise(points, seed, progress.part(0.1, 0.4), noisy)
     neighbours = _rounded(_SHARE * noise.neighbours, len(points))
     moved = points

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from ..errors import InputError, VADError
-from ..points import real_numbers
+from ..errors import VADError
+from ..points import finite_points
 from .blocks import Blocks
 from .feet import Feet
 from .grid import CORNERS
@@ -24,7 +24,7 @@ class _OnGrid:
         """Distance at points `x`, (m,3) -> (m,) float64: trilinear where there are values, next to the surface of an
         unsigned field by the steps `near` (see :meth:`NearBand.between`); outside the box, the value at the nearest
         point of the box plus the distance to that point. Raises :class:`InputError` for anything but finite points."""
-        cells = (_points(x) - self.origin) / self.spacing
+        cells = (finite_points(x) - self.origin) / self.spacing
         inside = np.clip(cells, 0, np.array(self.shape) - 1)
         found = self._inside(inside)
         if self.near is not None and not self.sdf:
@@ -34,18 +34,9 @@ class _OnGrid:
 
     def gradient(self, x) -> np.ndarray:
         """Unit-free gradient of :meth:`sample` at `x`, (m,3) -> (m,3) float64, central differences of half a cell."""
-        x, step = _points(x), 0.5 * self.spacing
+        x, step = finite_points(x), 0.5 * self.spacing
         slopes = [(self.sample(x + e) - self.sample(x - e)) / (2 * step) for e in step * np.eye(3)]
         return np.stack(slopes, axis=1)
-
-
-def _points(x):
-    x = real_numbers(x, "points", "an (m,3) array")
-    if x.ndim != 2 or x.shape[1] != 3:
-        raise InputError(f"points have shape {x.shape}; give an (m,3) array")
-    if not np.isfinite(x).all():
-        raise InputError(f"{(~np.isfinite(x).all(axis=1)).sum()} of {len(x)} points are not finite; leave them out")
-    return x
 
 
 @dataclass(frozen=True)

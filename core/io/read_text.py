@@ -1,6 +1,7 @@
 """Points from text: tables of numbers and Wavefront OBJ."""
 
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 
+_COMMA = re.compile(r"\d,\d")
 _UNIT = re.compile(r"\([^)]*\)|\[[^]]*\]")  # as in "X (m)"
 
 
@@ -58,8 +60,11 @@ class _Lines:
 
 
 def _open(path):
-    """Numbers are ASCII; what else stands in comments and further columns must not matter."""
-    return open(path, encoding="utf-8-sig", errors="replace")
+    """Numbers are ASCII; what else stands in comments and further columns must not matter. With the mark of UTF-16, as
+    spreadsheets write it, the text is that."""
+    with open(path, "rb") as file:
+        wide = file.read(2) in (BOM_UTF16_LE, BOM_UTF16_BE)
+    return open(path, encoding="utf-16" if wide else "utf-8-sig", errors="replace")
 
 
 def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
@@ -70,10 +75,11 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
         return np.loadtxt(chain([first], rows), delimiter=delimiter, usecols=columns, comments=None, ndmin=2)
     except ValueError as error:  # loadtxt takes one row at a time: the last one is the culprit
         seen = lines.text.strip()
+        remedy = "; write decimals with a point" if _COMMA.search(seen) and delimiter != "," else ""
         seen = seen if len(seen) <= 60 else seen[:60] + "..."
         raise InputError(
             f"{path}: line {lines.number} is {seen!r}; numbers x y z are expected in "
-            f"columns {', '.join(str(column + 1) for column in columns)}"
+            f"columns {', '.join(str(column + 1) for column in columns)}{remedy}"
         ) from error
 
 

@@ -7,7 +7,7 @@ from ..errors import InputError
 from ..reconstruction import Reconstruction
 from .mesh import Mesh
 
-_OWN = {"distance", "confidence"}
+_OWN, _OTHERS = {"distance", "confidence"}, "scan_"
 
 
 def vertex_attributes(mesh: Mesh, result: Reconstruction, carried: dict | None = None) -> dict[str, np.ndarray]:
@@ -16,7 +16,8 @@ def vertex_attributes(mesh: Mesh, result: Reconstruction, carried: dict | None =
     distance   : float32, see :func:`residuals`
     confidence : float32 in [0,1], that of the nearest sample
     carried    : what the input's points carry, by name, (n,) or (n,k) of any type, a row for each row of the input. A
-                 vertex gets that of its nearest sample, unchanged; what has one of the two names above is left out
+                 vertex gets that of its nearest sample, unchanged; what has one of the two names above gets "scan_" put
+                 before its own
 
     Raises :class:`InputError` for carried values with another number of rows than the input.
     """
@@ -32,7 +33,8 @@ def sample_attributes(result: Reconstruction, carried: dict | None = None) -> di
     for name, values in carried.items():
         if len(values) != count:
             raise InputError(f"attribute {name!r} has {len(values)} rows for {count} points; give one row for each")
-    kept = {name: np.asarray(values)[result.source_index] for name, values in carried.items() if name not in _OWN}
+    names = {name: _OTHERS * (name in _OWN) + name for name in carried}
+    kept = {names[name]: np.asarray(values)[result.source_index] for name, values in carried.items()}
     return {"confidence": result.confidence.astype(np.float32), **kept}
 
 

@@ -22,6 +22,7 @@ CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made 
 _SPARSE = 3.0  # cells, median local spacing above which the iso-surface is taken further off
 _RAISED = 0.5  # cells further for each cell of it above that
 _WITHIN = 0.75  # of the box's padding, at most
+_CLOSEST = 0.51  # cells; at half a cell a sheet midway between nodes has none below the level
 _LONGEST_STEP = 2.0  # levels
 _DENSE = 2 / 3  # cells, median local spacing
 
@@ -34,7 +35,7 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     `spot_sparse500` of the benchmarks its Euler number is -48 at 1 cell and -18 at the 2.5 that this is; 4 is right.
     """
     raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
-    return max(offset, min(raised, _WITHIN * padding_cells(max(grid.shape) - 1)))
+    return max(offset, _CLOSEST, min(raised, _WITHIN * padding_cells(max(grid.shape) - 1)))
 
 
 def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:

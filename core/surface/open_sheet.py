@@ -60,7 +60,7 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
 
 def _apart(vertices, faces):
     """With a vertex for each of the sheets that have no more than it in common."""
-    sheet = _connected(edge_numbers(faces, len(vertices))[0])
+    sheet = _connected(edge_numbers(faces, len(vertices))[0]).astype(np.int64)
     key, corners = np.unique(faces + len(vertices) * sheet[:, None], return_inverse=True)
     return vertices[key % len(vertices)], corners.reshape(faces.shape)
 

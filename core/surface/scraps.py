@@ -80,14 +80,14 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
     for patch in np.flatnonzero(open_patch):
         if _is_spur(mesh, face[parts[patch]], edge, counts, cell):
             drop(parts[patch])
-    basis = {}
+    basis, bit = {}, {number: k for k, number in enumerate(np.unique(edge[face][rim]).tolist())}
     for patch in np.argsort(cost, kind="stable"):
         part = parts[patch]
         if open_patch[patch]:
             continue
         row = 0
         for number in edge[face[part]][rim[part]].tolist():
-            row ^= 1 << number
+            row ^= 1 << bit[number]
         while row and row.bit_length() in basis:
             row ^= basis[row.bit_length()]
         if row:

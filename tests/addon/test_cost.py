@@ -57,6 +57,15 @@ def test_the_answer_follows_the_settings_and_goes_with_the_points(blender, exten
     assert cost.lines(blender.context) == []
 
 
+def test_noisy_points_are_noticed(extension):
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(20_000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    of = extension("vad_addon.cost").Points.of
+    assert not of(points).noisy
+    assert of(points + rng.normal(size=points.shape) * 0.02).noisy
+
+
 def test_a_fine_resolution_comes_with_a_band(blender, extension, add_mesh, sphere):
     x, y = np.meshgrid(np.linspace(0, 1, 1000), [0, 1e-3])  # 800 along the box
     add_mesh("Rows", np.column_stack([x.ravel(), y.ravel(), np.zeros(2000)]))
@@ -66,3 +75,6 @@ def test_a_fine_resolution_comes_with_a_band(blender, extension, add_mesh, spher
     assert stored.resolution > 512
     assert stored.band == "4"
     assert extension("vad_addon.properties").settings_from(stored).band == 4.0
+    stored.band, stored.offset = "none", 3.0
+    blender.ops.vad.use_resolution()
+    assert extension("vad_addon.properties").settings_from(stored).band == 5.0

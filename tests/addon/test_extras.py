@@ -57,6 +57,23 @@ def test_a_shell_lies_at_its_distance_on_both_sides(blender, result):
         assert len(mesh.polygons) > 100
 
 
+def test_shells_and_slices_follow_from_unsigned_distances_to_signed_ones_and_back(blender, scan, result):
+    blender.ops.vad.shell(offset=3)
+    shell = blender.context.active_object
+    blender.ops.vad.slice(axis="Z")
+    cut = blender.context.active_object
+    scan.select_set(True)
+    blender.context.view_layer.objects.active = scan
+    for surface, least in (("signed", -0.5), ("double", 0.0)):
+        blender.ops.vad.reconstruct(resolution=32, surface=surface)
+        blender.context.view_layer.update()
+        assert len(evaluated(blender, shell)[1].polygons) > 100
+        distance = evaluated(blender, cut)[1].attributes["distance"].data
+        found = [item.value for item in distance]
+        assert max(found) > 0.2
+        assert (min(found) < least) == (surface == "signed")
+
+
 def test_in_a_band_shells_and_slices_show_as_far_as_it_goes(blender, scan, tmp_path):
     blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
     blender.ops.vad.reconstruct(resolution=48, band="4")

@@ -100,13 +100,26 @@ def test_a_refusal_arrives_as_the_sentence_of_the_core(extension, start, task, s
     assert "\n" not in str(caught.value)
 
 
-def test_a_surprise_arrives_as_one_line(extension, start, task, sphere):
-    job = start(task(np.array(["a", "b"], object).astype("S1")))  # no points at all, and not what the core expects
+def test_a_surprise_arrives_as_one_line(extension, start, task, sphere, monkeypatch):
+    save = extension("vad_addon.outcome").Task.save
+    monkeypatch.setattr(extension("vad_addon.outcome").Task, "save", lambda task, path: path.write_bytes(b"no task"))
+    job = start(task(sphere))
+    monkeypatch.setattr(extension("vad_addon.outcome").Task, "save", save)
     wait(job, ended)
-    with pytest.raises(extension("core.errors").VADError) as caught:
+    with pytest.raises(extension("core.errors").VADError, match="The reconstruction failed: ") as caught:
         job.outcome()
     assert "\n" not in str(caught.value)
     assert "Traceback" not in str(caught.value)
+
+
+def test_what_libraries_print_is_passed_over(start, task, sphere):
+    job = start(task(sphere))
+    wait(job, under_way)
+    with open(job._folder / "progress", "ab") as output:
+        output.write(b"a library's remark\n")
+    wait(job, ended)
+    assert job.fraction == 1.0
+    job.outcome()
 
 
 def test_stopping_is_immediate_and_leaves_nothing(start, large, tmp_path):

@@ -173,6 +173,18 @@ def test_the_closed_mesh_comes_from_the_field_as_it_is(blender, folder, scan, wh
     assert set(report["meshes"]) == {"double"}
 
 
+def test_the_closed_mesh_comes_from_signed_distances_as_well(blender, folder, scan, whole_runs):
+    blender.ops.vad.reconstruct(resolution=24)
+    expected = values(by_role(blender)["surface"].data, "position", "vector", 3)
+    blender.ops.vad.reconstruct(resolution=24, surface="signed")
+    del whole_runs[:]
+    assert blender.ops.vad.reextract(resolution=24, surface="double") == {"FINISHED"}
+    assert not whole_runs
+    found = values(by_role(blender)["surface"].data, "position", "vector", 3)
+    assert found.shape == expected.shape
+    assert np.percentile(np.linalg.norm(found - expected, axis=1), 99) < 0.05 * np.ptp(expected, axis=0).max() / 24
+
+
 @pytest.mark.parametrize("other", [dict(bridge=5.0), dict(resolution=20), dict(surface="single"), dict(band="4")])
 def test_another_field_is_made_where_that_one_does_not_do(blender, scan, whole_runs, other):
     blender.ops.vad.reconstruct(resolution=24)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core import Settings, VADError, reconstruct
-from core.budget import Estimate, check_budget, estimate_cost, free_memory_mb
+from core.budget import Estimate, _probe, check_budget, estimate_cost, free_memory_mb
 from core.cleaning.noise import looks_noisy
 from core.cli import main
 from core.errors import MemoryBudgetError
@@ -34,7 +34,15 @@ def test_more_points_and_finer_grids_cost_more():
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak of a child process is read from /proc")
 @pytest.mark.parametrize(
     ("samples", "settings"),
-    [(2000, "192"), (30_000, "64"), (10_000, "128"), (10_000, "128, surface='both'"), (2000, "192, band=4")],
+    [
+        (2000, "192"),
+        (30_000, "64"),
+        (10_000, "128"),
+        (10_000, "128, surface='both'"),
+        (2000, "192, band=4"),
+        (2000, "192, integration='poisson'"),
+        (6000, "64, solver='energy', backend='numpy'"),
+    ],
 )
 def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
     script = (
@@ -55,6 +63,23 @@ def test_processor_time_is_what_a_run_takes_within_a_factor_of_two(samples, sett
     estimated = reconstruct(shapes.sphere(samples), settings).report["estimate"]["cpu_seconds"]
     taken = time.process_time() - begun
     assert taken / 2 < estimated < 2 * taken
+
+
+def test_a_clock_that_ticks_slowly_does_for_the_probe(monkeypatch):
+    tick, true = 1 / 64, time.thread_time
+    monkeypatch.setattr("core.budget.time.thread_time", lambda: true() // tick * tick)
+    for _ in range(40):
+        took, busy = _probe()
+        assert 0 < took < 1
+        assert 1 <= busy < 1000
+
+
+def test_a_grid_without_room_for_the_offset_is_not_advised():
+    grid, spacing = fit_grid(np.array([[0, 0, 0], [1, 1, 1.0]]), 400), np.full(1000, 0.1)
+    for offset, advised in ((1.0, "use resolution 19 or less"), (4.0, "lower the offset")):
+        settings = Settings(resolution=400, offset=offset, memory_limit=64.0)
+        with pytest.raises(MemoryBudgetError, match=advised):
+            check_budget(estimate_cost(spacing, grid, settings), spacing, grid, settings)
 
 
 def test_noise_costs(monkeypatch):

@@ -99,13 +99,14 @@ def test_meshes_and_points_carry_what_the_scan_does(capsys, calls, tmp_path):
     points, red = np.random.default_rng(0).normal(size=(400, 3)), np.arange(400).astype(np.uint8)
     write_points(tmp_path / "scan.ply", points, points, {"red": red, "distance": red})
     assert run(capsys, "reconstruct", tmp_path / "scan.ply", "-o", tmp_path / "out", "--surface", "both")[0] == 0
-    for ending, names in (("double", ["distance", "confidence", "red"]), ("points", ["confidence", "red"])):
+    kept = ["confidence", "red", "scan_distance"]
+    for ending, names in (("double", ["distance", *kept]), ("points", kept)):
         found = read_scan(tmp_path / "out" / f"scan_{ending}.ply")[1]
         assert list(found) == names
         np.testing.assert_array_equal(found["red"], [0, 1, 2, 3])
         np.testing.assert_array_equal(found["confidence"], 1)
     found = read_scan(tmp_path / "out" / "scan_single.ply")[1]
-    assert found.keys() == {"distance", "confidence", "red"}
+    assert found.keys() == {"distance", *kept}
     assert (found["distance"] >= 1).all()  # the field is one, and the mesh beyond its box
 
 
@@ -307,8 +308,60 @@ def test_info_counts_and_measures(capsys, tmp_path):
     assert facts["grid"]["shape"][0] == 65
     np.testing.assert_allclose(facts["spacing"], 0.5 * (4 + 2 * np.sqrt(2)) / 6)  # four straight, two diagonal
     status, out, _ = run(capsys, "info", tmp_path / "lattice.npy")
-    assert "203, of which 1 not finite and 2 duplicates" in out
+    assert "203, of which 1 not finite, 2 duplicates and 0 near copies of others" in out
     assert "size 9.5 4.5 0" in out
+
+
+def test_info_tells_near_copies_from_duplicates(capsys, tmp_path):
+    points = np.random.default_rng(0).uniform(size=(1000, 3)) * [1, 1, 0]
+    np.save(tmp_path / "scan.npy", np.vstack([points, points[:400] + 1e-6, points[:7]]))
+    facts = json.loads(run(capsys, "info", tmp_path / "scan.npy", "--json")[1])
+    assert facts["duplicates"] == 7
+    assert 400 <= facts["near_copies"] < 420
+
+
+def test_options_are_taken_as_the_settings_spell_them(capsys, scan, calls, tmp_path):
+    for name in ("--memory_limit", "--memory-limit"):
+        assert run(capsys, "reconstruct", scan, "-o", tmp_path, name, "640")[0] == 0
+        assert calls[-1][1].memory_limit == 640
+
+
+def test_files_of_another_run_are_told_and_stay(capsys, scan, calls, tmp_path):
+    run(capsys, "reconstruct", scan, "-o", tmp_path, "--surface", "both")
+    before = (tmp_path / "ball_single.ply").read_bytes()
+    _, _, err = run(capsys, "reconstruct", scan, "-o", tmp_path, "--surface", "signed")
+    for ending in ("double", "single"):
+        assert f"warning: {tmp_path / f'ball_{ending}.ply'} is not of this run" in err
+    assert (tmp_path / "ball_single.ply").read_bytes() == before
+
+
+def test_a_run_out_of_memory_is_one_line_and_status_3(capsys, scan, monkeypatch, tmp_path):
+    def reconstruct(*given, **named):
+        raise MemoryError("Unable to allocate 9 GiB")
+
+    monkeypatch.setattr(cli, "reconstruct", reconstruct)
+    status, out, err = run(capsys, "reconstruct", scan, "-o", tmp_path, "--json")
+    assert status == 3
+    assert err.startswith("error: out of memory (Unable to allocate 9 GiB); use a lower resolution")
+    assert err.count("\n") == 1
+    assert json.loads(out)["error"] in err
+
+
+def test_a_scan_that_goes_meanwhile_is_named(capsys, scan, monkeypatch, tmp_path):
+    def gone(*given):
+        raise FileNotFoundError(2, "No such file or directory", str(scan))
+
+    monkeypatch.setattr(cli, "_spare", gone)
+    assert f"error: {scan}: No such file or directory" in refused(capsys, "reconstruct", scan, "-o", tmp_path)
+
+
+def test_ctrl_c_while_modules_load_is_a_cancel(tmp_path):
+    (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
+    done = subprocess.run(
+        [sys.executable, "-m", "core", "info", "scan.ply"],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "error: cancelled\n")
 
 
 def test_a_real_process_from_scan_to_files(scan, tmp_path):

@@ -59,7 +59,7 @@ def test_what_work_raises_comes_out():
 
 
 @pytest.mark.parametrize("count", [1, _FEW, _FEW + 1, 8192, 8193, 20_000, 50_000, 1_000_000])
-@pytest.mark.parametrize("cores", [1, 2, 3, 16])
+@pytest.mark.parametrize("cores", [1, 2, 3, 8])
 def test_even_chunks_keep_all_cores_at_work_to_the_end(count, cores, monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     parts = list(even_chunks(count, 8192, Progress()))

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core import InputError
+from core import InputError, denoise, fit_grid, remove_outliers
 from core.points import local_spacing, prepare_samples
 from tests import shapes
 
@@ -135,3 +135,21 @@ def test_spacing_of_a_cubic_grid_is_its_step_inside():
     grid = np.indices((5, 5, 5)).reshape(3, -1).T * 0.25
     inside = ((grid > 0) & (grid < 1)).all(axis=1)
     np.testing.assert_allclose(local_spacing(grid)[inside], 0.25)
+
+
+def test_single_stages_take_lists_and_integers_and_refuse_what_is_no_cloud():
+    lattice = [[i, j, k] for i in range(6) for j in range(6) for k in range(6)]
+    spacing = local_spacing(lattice)
+    np.testing.assert_array_equal(spacing, local_spacing(np.array(lattice, float)))
+    assert denoise(np.array(lattice), spacing, 1.0)[0].shape == (216, 3)
+    assert len(remove_outliers(lattice)[0]) == 216
+    assert fit_grid(lattice, 16).shape == (17, 17, 17)
+    broken = np.array(lattice, float)
+    broken[3] = np.nan
+    for stage in (local_spacing, remove_outliers, lambda x: denoise(x, spacing), lambda x: fit_grid(x, 16)):
+        with pytest.raises(InputError, match="finite"):
+            stage(broken)
+    with pytest.raises(InputError, match="1 points given; at least 2 are needed"):
+        local_spacing([[0, 0, 0]])
+    with pytest.raises(InputError, match="not all in one place"):
+        fit_grid(np.ones((5, 3)), 16)

@@ -96,7 +96,7 @@ def test_a_small_closed_body_of_its_own_stays(count):
     box = rng.uniform(-half, half, (count, 3))
     box[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-half, half], count)
     for body in (box, half * shapes.scattered_sphere(count)):
-        points, _ = with_strays(body + [2, 0, 0])
+        points, _ = with_strays(body + np.array([2, 0, 0]))
         assert not find_outliers(points)[-count:].any()
 
 

@@ -127,3 +127,14 @@ def test_a_million_rows_in_seconds(folder):
     assert time.perf_counter() - start < 5
     assert points.shape == (1_000_000, 3)
     path.unlink()
+
+
+def test_reads_what_spreadsheets_write_as_unicode_text(folder):
+    path = folder / "wide.txt"
+    path.write_bytes("x\ty\tz\r\n1\t2\t3\r\n4\t5\t6.5\r\n".encode("utf-16"))
+    np.testing.assert_array_equal(read_points(path), [[1, 2, 3], [4, 5, 6.5]])
+
+
+def test_decimal_commas_are_named(folder):
+    assert "write decimals with a point" in refusal(folder, "comma.txt", "1,5;2,5;3,5\n4,5;5,5;6,5\n")
+    assert "decimals" not in refusal(folder, "words.csv", "1,2,3\n4,five,6\n")

@@ -30,11 +30,12 @@ def test_what_points_carry_comes_from_the_nearest_sample_by_its_row_in_the_input
     nearest = np.einsum("vni,vni->vn", far, far).argmin(axis=1)
     label, colour = np.arange(3000, dtype=np.uint16), random.integers(0, 256, (3000, 3), np.uint8)
     found = vertex_attributes(mesh, run, {"label": label, "colour": colour, "confidence": label})
-    assert list(found) == ["distance", "confidence", "label", "colour"]
+    assert list(found) == ["distance", "confidence", "label", "colour", "scan_confidence"]
+    np.testing.assert_array_equal(found["scan_confidence"], found["label"])
     np.testing.assert_array_equal(found["label"], row[nearest])
     np.testing.assert_array_equal(found["colour"], colour[row[nearest]])
     np.testing.assert_array_equal(found["confidence"], run.confidence[nearest].astype(np.float32))
-    assert [values.dtype.name for values in found.values()] == ["float32", "float32", "uint16", "uint8"]
+    assert [values.dtype.name for values in found.values()] == ["float32", "float32", "uint16", "uint8", "uint16"]
     np.testing.assert_array_equal(sample_attributes(run, {"label": label})["label"], row)
 
 

@@ -160,3 +160,13 @@ def test_few_samples_leave_no_holes(count, band):
     surface = reconstruct(shapes.scattered_sphere(count), Settings(resolution=96, band=band)).surface
     assert [shapes.euler(piece) for piece in shapes.components(surface)] == [2, 2]
     assert set(surface.edge_counts()[1]) == {2}
+
+
+def test_at_the_least_offset_a_sheet_midway_between_nodes_is_covered():
+    rng = np.random.default_rng(0)
+    flat = rng.uniform(size=(4000, 3)) * [1, 1, 0]
+    result = reconstruct(flat, Settings(resolution=132, offset=0.5))
+    middle = result.field.origin[2] / result.field.spacing
+    assert abs(middle % 1 - 0.5) < 0.01  # or the grid does not show what this is about
+    assert KDTree(result.surface.vertices).query(flat)[0].max() < 2 * result.field.spacing
+    assert len(shapes.components(result.surface)) == 1

@@ -101,3 +101,11 @@ def test_sheets_with_one_vertex_in_common_are_parted():
     assert len(parted) == 10 + 2  # 5 and 6 are shared by sheets: the third face's own
     assert not np.isin(moved[2], moved[[0, 1, 3]]).any()
     assert np.isin(moved[0][[0, 1]], moved[3]).all()
+
+
+def test_sheets_are_parted_however_many_there_are():
+    count = 40_000  # times their vertices is more than 32 bits hold
+    vertices = np.random.default_rng(0).normal(size=(4 * count, 3))
+    faces = np.arange(4 * count, dtype=np.int32).reshape(-1, 4)
+    parted, moved = _apart(vertices, faces)
+    np.testing.assert_array_equal(parted[moved], vertices[faces])
