@@ -87,7 +87,7 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
         band = _fitting_band(len(spacing), area, limit, settings)
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
-    elif len(spacing) > (fitting := max(0, int((limit - _MEMORY["diagram"]) / _MEMORY["sample"]))):
+    elif len(spacing) > (fitting := _fitting_samples(limit, settings)):
         remedy = f"thin the {len(spacing)} points to {fitting} or fewer, or raise memory_limit"
     else:
         remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
@@ -111,9 +111,8 @@ def free_memory_mb() -> float:
 
 def _memory(samples, area, nodes, settings):
     """MiB of a run over a surface of `area` squared cells: of its most costly stage."""
-    diagram, by_cores = _MEMORY["diagram"] + _MEMORY["sample"] * samples, _CORE * max(0, cores() - 2)
-    if settings.solver == "energy":
-        diagram = _MEMORY["diagram"] + _ENERGY["sample"] * samples + _ENERGY["torch"] * (settings.backend != "numpy")
+    least, each = _by_samples(settings)
+    diagram, by_cores = least + each * samples, _CORE * max(0, cores() - 2)
     if settings.band is not None:
         kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
         return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
@@ -121,6 +120,19 @@ def _memory(samples, area, nodes, settings):
     field = _MEMORY["field"] + node * nodes
     meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _MESHES[settings.surface] * area
     return by_cores + max(diagram, field, meshes)
+
+
+def _by_samples(settings):
+    """MiB that normals take for any samples, and for each of them."""
+    if settings.solver != "energy":
+        return _MEMORY["diagram"], _MEMORY["sample"]
+    return _MEMORY["diagram"] + _ENERGY["torch"] * (settings.backend != "numpy"), _ENERGY["sample"]
+
+
+def _fitting_samples(limit, settings):
+    """How many samples normals can be found of within `limit` MiB."""
+    least, each = _by_samples(settings)
+    return max(0, int((limit - least) / each))
 
 
 def _memory_at(resolution, samples, area, grid, settings):

@@ -66,11 +66,11 @@ def real_numbers(given, what: str, wanted: str) -> np.ndarray:
         raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
 
 
-def points_array(given, what: str = "points") -> np.ndarray:
+def points_array(given) -> np.ndarray:
     """An array-like of points as (n,3) float64. Raises :class:`InputError` for another shape or other than numbers."""
-    points = real_numbers(given, what, "an (n,3) array")
+    points = real_numbers(given, "points", "an (n,3) array")
     if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"{what} have shape {points.shape}; give an (n,3) array of x, y, z")
+        raise InputError(f"points have shape {points.shape}; give an (n,3) array of x, y, z")
     return points
 
 

@@ -163,8 +163,10 @@ class _Surroundings:
         size = np.bincount(part, minlength=count)
         thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
         clouds = thick & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
+        ends = np.cumsum(size)
+        by_part = np.argsort(part, kind="stable")
         for number in np.flatnonzero(clouds & (size >= _SHELL[0])):
-            row = np.flatnonzero(part == number)
+            row = by_part[ends[number] - size[number] : ends[number]]
             clouds[number] = not _is_shell(self.points[row], self.spacing[row])
         return clouds[part]
 
@@ -172,6 +174,7 @@ class _Surroundings:
 def _is_shell(points, spacing):
     """Whether nearly all of a part's points (m,3) lie on its convex hull."""
     _, most, near = _SHELL
+    points = points - points.mean(axis=0)
     faces = ConvexHull(points, qhull_options="QJ").equations
     depth = -(points @ faces[:, :3].T + faces[:, 3]).max(axis=1)
     return (depth < near * spacing).mean() >= most

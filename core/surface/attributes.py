@@ -33,9 +33,12 @@ def sample_attributes(result: Reconstruction, carried: dict | None = None) -> di
     for name, values in carried.items():
         if len(values) != count:
             raise InputError(f"attribute {name!r} has {len(values)} rows for {count} points; give one row for each")
-    names = {name: _OTHERS * (name in _OWN) + name for name in carried}
-    kept = {names[name]: np.asarray(values)[result.source_index] for name, values in carried.items()}
-    return {"confidence": result.confidence.astype(np.float32), **kept}
+    kept = {"confidence": result.confidence.astype(np.float32)}
+    for name, values in carried.items():
+        while name in _OWN or name in kept:
+            name = _OTHERS + name
+        kept[name] = np.asarray(values)[result.source_index]
+    return kept
 
 
 def nearest_samples(mesh: Mesh, result: Reconstruction) -> np.ndarray:

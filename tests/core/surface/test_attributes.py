@@ -37,6 +37,9 @@ def test_what_points_carry_comes_from_the_nearest_sample_by_its_row_in_the_input
     np.testing.assert_array_equal(found["confidence"], run.confidence[nearest].astype(np.float32))
     assert [values.dtype.name for values in found.values()] == ["float32", "float32", "uint16", "uint8", "uint16"]
     np.testing.assert_array_equal(sample_attributes(run, {"label": label})["label"], row)
+    again = sample_attributes(run, {"confidence": label, "scan_confidence": colour})
+    assert list(again) == ["confidence", "scan_confidence", "scan_scan_confidence"]
+    np.testing.assert_array_equal(again["scan_scan_confidence"], colour[row])
 
 
 def test_a_row_for_each_point_of_the_input_is_needed(sphere_run):
