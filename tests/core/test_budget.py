@@ -57,12 +57,12 @@ def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
 
 
 @pytest.mark.parametrize(("samples", "settings"), [(8000, {}), (1500, {"surface": "both"}), (4000, {"band": 4.0})])
-def test_processor_time_is_what_a_run_takes_within_a_factor_of_two(samples, settings):
+def test_processor_time_is_what_a_run_takes_within_a_factor_of_three(samples, settings):
     settings = Settings(resolution=96, denoise=0, **settings)
     begun = time.process_time()
     estimated = reconstruct(shapes.sphere(samples), settings).report["estimate"]["cpu_seconds"]
     taken = time.process_time() - begun
-    assert taken / 2 < estimated < 2 * taken
+    assert taken / 3 < estimated < 3 * taken
 
 
 def test_a_clock_that_ticks_slowly_does_for_the_probe(monkeypatch):
