@@ -32,7 +32,7 @@ _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
 _DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
 _SMALL_PART, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part
-_SHELL = 24, 0.9, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
+_SHELL = 16, 0.95, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
 
 _DIRTY = 0.005  # share of strays from which on those close to the surface are looked for as well
 _STRICT = 0.7  # share of the limits above that then holds for those beside a surface

@@ -90,7 +90,7 @@ def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
     assert not find_outliers(with_strays(flat)[0]).any()
 
 
-@pytest.mark.parametrize("count", [24, 60])
+@pytest.mark.parametrize("count", [18, 24, 60])
 def test_a_small_closed_body_of_its_own_stays(count):
     rng, half = np.random.default_rng(2), 0.012 * np.sqrt(count)
     box = rng.uniform(-half, half, (count, 3))
