@@ -13,7 +13,7 @@ from .curvature import bending, tangent_frames
 from .line_gaps import with_line_gaps_bridged
 from .projection import NEAREST, Projection, project
 from .rim_lines import with_rim_lines
-from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged
+from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 
 NEIGHBOURS = 16  # of a sample, that its patch is fitted to
 _CHUNK = 16384  # samples
@@ -81,7 +81,9 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     bend = bending(points, normals, frames, spacing, neighbours, progress.part(0.1, 0.5))
     rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, progress.part(0.5, 0.84))
     rims = with_openings_kept(rims, points, normals, spacing, neighbours, tree, bridge, progress.part(0.84, 0.86))
-    rims = with_line_gaps_bridged(rims, points, normals, spacing, tree, bridge, progress.part(0.86, 0.88))
+    part = progress.part(0.86, 0.87)
+    rims = with_sparser_parts_joined(rims, points, normals, spacing, neighbours, tree, bridge, part)
+    rims = with_line_gaps_bridged(rims, points, normals, spacing, tree, bridge, progress.part(0.87, 0.88))
     part = progress.part(0.88, 0.9)
     rims = with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, bridge, part)
     rims = with_rim_lines(rims, points, normals, spacing, tree, progress.part(0.9, 1.0))

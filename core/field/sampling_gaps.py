@@ -8,6 +8,9 @@ two sides meet over it. In a round one they may all have others to both sides; i
 Beside either, samples are far from their neighbours. That is no reason to bridge an opening further: on `petals_10k` of
 the benchmarks samples at the rims of bays have local spacings of 1.5 to 1.8 times those around them, and bays five of
 those wide were shut.
+
+Where the sampling is abruptly sparser, samples look across a gap that is too wide for them, and for those on its other
+side an ordinary one, which they bridge; both have to.
 """
 
 from dataclasses import replace
@@ -25,6 +28,9 @@ _ROUND = np.radians(90)  # least angle without neighbours beside a round gap, wh
 _NEXT = 2.5  # local spacings from a rim, where openings are not looked across
 _WIDER = 1.5  # bridging lengths, at most, that a gap in the sampling is wide
 _CHANCE = 1.2  # of the width that chance leaves; the spacing beside a gap scatters, too
+_SPARSER = 2.5  # of the local spacings around, that of samples in a sparser part; rims' own reach 1.8
+_FURTHER = 4.0  # bridging lengths, up to where a sparser part is looked for
+_MOST = 256  # samples among which it is
 _APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
 
 
@@ -39,11 +45,32 @@ def with_openings_kept(
     row = np.flatnonzero(rims.bridged)
     usual = np.median(spacing[neighbours[row]], axis=1)
     row = row[rims.reach[row] > bridged_reach(bridge * usual, spacing[row])]
-    _, other = _looked_across(rims, row, points, normals, spacing, tree, bridge, progress)
+    _, other = _looked_across(row, rims.outward[row], points, normals, spacing, tree, bridge, progress)
     chain = chain_lengths(rims, rims.gap)
     row = row[np.maximum(chain[row], chain[other]) >= _MANY]
     bridged, reach = rims.bridged.copy(), rims.reach.copy()
     bridged[row], reach[row] = False, 0.0
+    return replace(rims, bridged=bridged, reach=reach)
+
+
+def with_sparser_parts_joined(
+    rims: Rims, points, normals, spacing, neighbours, tree: KDTree, bridge: float, progress=None
+) -> Rims:
+    """The rims with gaps bridged beyond which the sheet goes on more sparsely sampled, no wider than `bridge` local
+    spacings of the sample across.
+
+    points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
+    """
+    row, cloud = np.flatnonzero(rims.gap & ~rims.bridged), (points, normals, spacing, tree)
+    usual = np.median(spacing[neighbours[row]], axis=1)
+    distance, other = _looked_across(row, rims.outward[row], *cloud, _FURTHER * bridge, progress, _MOST)
+    ordinary = distance <= bridge * spacing[other]
+    row, usual, distance, other = row[ordinary], usual[ordinary], distance[ordinary], other[ordinary]
+    onward, beyond = _looked_across(other, rims.outward[row], *cloud, _WIDER * bridge, progress)
+    sparser = np.isfinite(onward) & (spacing[beyond] >= _SPARSER * usual)
+    row, distance = row[sparser], distance[sparser]
+    bridged, reach = rims.bridged.copy(), rims.reach.copy()
+    bridged[row], reach[row] = True, bridged_reach(distance, spacing[row])
     return replace(rims, bridged=bridged, reach=reach)
 
 
@@ -59,7 +86,7 @@ def with_sampling_gaps_bridged(
     rim = rims.gap & ~rims.bridged
     round_ = ~rims.gap & (rims.opening < np.cos(_ROUND / 2)) & _far_from(rim & ~few, points, spacing)
     row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(points)))
-    distance, other = _looked_across(rims, row, points, normals, spacing, tree, widest, progress)
+    distance, other = _looked_across(row, rims.outward[row], points, normals, spacing, tree, widest, progress)
     across = np.isfinite(distance) & few[other]
     row, other, distance = row[across], other[across], distance[across]
     met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance
@@ -71,12 +98,14 @@ def with_sampling_gaps_bridged(
     return replace(rims, gap=gap, bridged=bridged, reach=reach)
 
 
-def _looked_across(rims, row, points, normals, spacing, tree, widest, progress):
-    """Distance and number, (m,) each, of the samples across the gaps of samples `row`; see :func:`across_gaps`."""
+def _looked_across(row, way, points, normals, spacing, tree, widest, progress, most=None):
+    """Distance and number, (m,) each, of the samples that samples `row` find in directions (m,3), up to `widest` local
+    spacings away; see :func:`across_gaps`."""
     distance, other = np.empty(len(row)), np.empty(len(row), np.int64)
 
     def look(part):
-        return across_gaps(row[part], rims.outward[row[part]], spacing[row[part]], points, normals, tree, widest)
+        of = row[part]
+        return across_gaps(of, way[part], spacing[of], points, normals, tree, widest, most=most)
 
     chunks = Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points)))
     for part, found in in_order(look, chunks):

@@ -6,7 +6,7 @@ from core.field import borders, sampling_gaps
 from core.field.borders import find_rims
 from core.field.curvature import bending, tangent_frames
 from core.field.local_surface import fit_local_surface, patch_neighbours
-from core.field.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged
+from core.field.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 from core.points import local_spacing
 from tests import shapes
 
@@ -31,6 +31,16 @@ def before_and_after(points, normals, bend_times=1.0):
 def with_and_without_openings_kept(points, normals):
     rims, normals, spacing, neighbours, tree = rims_of(points, normals)
     return with_openings_kept(rims, points, normals, spacing, neighbours, tree, 3.0), rims, spacing
+
+
+def with_and_without_sparser_parts_joined(points, normals):
+    rims, normals, spacing, neighbours, tree = rims_of(points, normals)
+    return with_sparser_parts_joined(rims, points, normals, spacing, neighbours, tree, 3.0), rims, spacing
+
+
+def sparser_to_one_side(points, ratio, random):
+    """The points, (m,3) of (n,3), of which one in `ratio` is left where x is negative."""
+    return points[(points[:, 0] > 0) | (random.random(len(points)) < 1 / ratio)]
 
 
 def open_rim(rims):
@@ -127,6 +137,38 @@ def test_looking_across_some_gaps_at_a_time_changes_nothing(monkeypatch):
     few = before_and_after(points, points)[1]
     np.testing.assert_array_equal(few.bridged, whole.bridged)
     np.testing.assert_array_equal(few.reach, whole.reach)
+
+
+def test_dense_samples_of_a_closed_surface_are_joined_to_sparse_ones(random):
+    points = sparser_to_one_side(shapes.scattered_sphere(20_000), 16, random)
+    joined, rims, spacing = with_and_without_sparser_parts_joined(points, points)
+    along = open_rim(rims) & (np.abs(points[:, 0]) < 0.02)
+    assert along.sum() > 50
+    assert open_rim(joined)[along].sum() < 0.4 * along.sum()
+    newly = joined.bridged & ~rims.bridged
+    assert np.abs(points[newly, 0]).max() < 0.2
+    assert (joined.reach[newly] >= spacing[newly]).all()
+    np.testing.assert_array_equal(joined.reach[~newly], rims.reach[~newly])
+
+
+@pytest.mark.parametrize(("width", "joined"), [(2.4, True), (4.2, False)])
+def test_an_opening_beside_a_sparser_part_is_bridged_if_that_one_bridges_it(width, joined, random):
+    """Samples 1 and 3 apart, to both sides of an opening of so many times 3."""
+    dense = np.stack(np.meshgrid(np.arange(30), np.arange(-45, 46)), axis=-1).reshape(-1, 2)
+    sparse = 3 * np.stack(np.meshgrid(-width - np.arange(10), np.arange(-15, 16)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([dense + random.uniform(-0.1, 0.1, dense.shape), sparse])
+    after, before, _ = with_and_without_sparser_parts_joined(np.pad(points, ((0, 0), (0, 1))), UP)
+    beside = (np.abs(points[:, 0]) < 0.5) & (np.abs(points[:, 1]) < 35)
+    assert open_rim(before)[beside].mean() > 0.9
+    assert after.bridged[beside].mean() > 0.8 if joined else not after.bridged[beside].any()
+
+
+def test_hardly_a_rim_of_evenly_random_samples_is_taken_for_one_of_a_denser_part(random):
+    turn, radius = random.uniform(0, 2 * np.pi, 20_000), np.sqrt(random.random(20_000))
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
+    joined, rims, _ = with_and_without_sparser_parts_joined(points, UP)
+    assert open_rim(rims).sum() > 300
+    assert (joined.bridged != rims.bridged).sum() < 5
 
 
 @pytest.mark.parametrize("count", [300, 3000, 30_000])
