@@ -29,6 +29,7 @@ _NEXT = 2.5  # local spacings from a rim, where openings are not looked across
 _WIDER = 1.5  # bridging lengths, at most, that a gap in the sampling is wide
 _CHANCE = 1.2  # of the width that chance leaves; the spacing beside a gap scatters, too
 _SPARSER = 2.5  # of the local spacings around, that of samples in a sparser part; rims' own reach 1.8
+_SOME = 6  # of its neighbours, that one is sparse for beside a denser part
 _FURTHER = 4.0  # bridging lengths, up to where a sparser part is looked for
 _MOST = 256  # samples among which it is
 _APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
@@ -61,7 +62,9 @@ def with_sparser_parts_joined(
 
     points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
     """
-    row, cloud = np.flatnonzero(rims.gap & ~rims.bridged), (points, normals, spacing, tree)
+    cloud = points, normals, spacing, tree
+    row = np.flatnonzero(rims.gap & ~rims.bridged)
+    row = row[_near_steps(row, points, spacing, neighbours, _FURTHER * bridge)]
     usual = np.median(spacing[neighbours[row]], axis=1)
     distance, other = _looked_across(row, rims.outward[row], *cloud, _FURTHER * bridge, progress, _MOST)
     ordinary = distance <= bridge * spacing[other]
@@ -96,6 +99,15 @@ def with_sampling_gaps_bridged(
     gap, bridged, reach = rims.gap.copy(), rims.bridged.copy(), rims.reach.copy()
     gap[row], bridged[row], reach[row] = True, True, covered
     return replace(rims, gap=gap, bridged=bridged, reach=reach)
+
+
+def _near_steps(row, points, spacing, neighbours, within):
+    """Which of samples `row` (m,) are within so many of their local spacings from one that is sparse for its
+    neighbours, (m,) bool."""
+    sparse = spacing >= _SPARSER * np.partition(spacing[neighbours], _SOME, axis=1)[:, _SOME]
+    if not sparse.any():
+        return np.zeros(len(row), bool)
+    return KDTree(points[sparse]).query(points[row])[0] <= within * spacing[row]
 
 
 def _looked_across(row, way, points, normals, spacing, tree, widest, progress, most=None):

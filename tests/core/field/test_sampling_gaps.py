@@ -151,7 +151,7 @@ def test_dense_samples_of_a_closed_surface_are_joined_to_sparse_ones(random):
     np.testing.assert_array_equal(joined.reach[~newly], rims.reach[~newly])
 
 
-@pytest.mark.parametrize(("width", "joined"), [(2.4, True), (4.2, False)])
+@pytest.mark.parametrize(("width", "joined"), [(1.8, True), (4.2, False)])
 def test_an_opening_beside_a_sparser_part_is_bridged_if_that_one_bridges_it(width, joined, random):
     """Samples 1 and 3 apart, to both sides of an opening of so many times 3."""
     dense = np.stack(np.meshgrid(np.arange(30), np.arange(-45, 46)), axis=-1).reshape(-1, 2)
