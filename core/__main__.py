@@ -3,6 +3,8 @@
 import os
 import sys
 
+from .exit_status import BAD_INPUT, CANCELLED
+
 if sys.stdout is not None:
     sys.stdout.reconfigure(errors="backslashreplace")  # file names need not be text
 try:
@@ -13,9 +15,9 @@ try:
         sys.stdout.flush()
 except KeyboardInterrupt:  # while modules are loaded
     sys.stderr.write("error: cancelled\n")
-    status = 130
+    status = CANCELLED
 except OSError as error:  # what is printed goes to a full disk, or nobody reads it; all files are written by then
     sys.stderr.write(f"error: standard output cannot be written to ({error.strerror}); check where it goes\n")
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    status = 2
+    status = BAD_INPUT
 sys.exit(status)

@@ -15,6 +15,7 @@ from tqdm import tqdm
 from .budget import estimate_cost
 from .cleaning.noise import looks_noisy
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
+from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
 from .field.grid import fit_grid
 from .io.atomic import writable_folder
 from .io.npz import write_arrays
@@ -32,7 +33,6 @@ PROGRAM = "python -m core"
 _MESHES = {kind: f"_{kind}.ply" for kind in ("double", "single", "signed")}
 _POINTS, _VOLUME, _ARRAYS, _REPORT = "_points.ply", ".vdb", ".npz", ".json"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
-DONE, BAD_INPUT, TOO_LARGE, CANCELLED = 0, 2, 3, 130
 
 _DESCRIPTION = "Reconstruct a surface from a point cloud without normals: distance field, mesh and normals."
 _EXAMPLE = f"""\

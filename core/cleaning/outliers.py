@@ -42,7 +42,7 @@ _HOVERING_FAR = 0.3  # and over the local spacing
 
 
 def find_outliers(points, progress=None) -> np.ndarray:
-    """(n,) bool: which samples (n,3) are strays.
+    """(n,) bool: which samples (n,3), float64 and finite, are strays.
 
     - beside a surface: lonelier than its neighbours and off their plane, or far lonelier;
     - scattered: sparse against the whole cloud, where most sparse samples around form no surface;
@@ -51,7 +51,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - detached: in a small part of its own that is a cloud rather than a sheet or the shell of a convex body;
     - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
     """
-    progress, points = Progress.of(progress), finite_points(points)
+    progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
         return stray
