@@ -104,7 +104,8 @@ def with_sampling_gaps_bridged(
 def _near_steps(row, points, spacing, neighbours, within):
     """Which of samples `row` (m,) are within so many of their local spacings from one that is sparse for its
     neighbours, (m,) bool."""
-    sparse = spacing >= _SPARSER * np.partition(spacing[neighbours], _SOME, axis=1)[:, _SOME]
+    some = min(_SOME, neighbours.shape[1] - 1)
+    sparse = spacing >= _SPARSER * np.partition(spacing[neighbours], some, axis=1)[:, some]
     if not sparse.any():
         return np.zeros(len(row), bool)
     return KDTree(points[sparse]).query(points[row])[0] <= within * spacing[row]
