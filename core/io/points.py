@@ -42,7 +42,8 @@ def read_points(path: str | os.PathLike) -> np.ndarray:
 
     .ply                    : x, y, z of the vertices; ascii or binary, with or without faces
     .xyz, .pts, .txt, .csv  : a point a line, split by blanks, commas or semicolons; comments after # or //. A first
-                              line may name the columns, x, y and z among them, or be the number of points
+                              line may name the columns, x, y and z among them, or be the number of points that
+                              follow, after which there may be more such blocks
     .npy, .npz              : an (n,3) array (of a .npz: the one called `points`, else the only one of that shape)
     .obj                    : the v lines
 

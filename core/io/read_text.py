@@ -3,7 +3,7 @@
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import TextIO
 
@@ -21,14 +21,17 @@ def read_text(path: Path) -> np.ndarray:
         lines = _Lines(file)
         rows = iter(lines)
         first = next(rows, "")
-        claimed, columns = None, (0, 1, 2)
-        if first.isdecimal():
-            claimed, first = int(first), next(rows, "")
+        claimed, columns = [], (0, 1, 2)
+        if _is_count(first):
+            claimed.append(int(first))
+            rows = _rows_of_blocks(rows, claimed)
+            first = next(rows, "")
         elif not any(map(_is_number, _split(first))):
             columns, first = _named_columns(path, first), next(rows, "")
         points = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), columns)
-    if claimed not in (None, len(points)):
-        raise InputError(f"{path} says {claimed} points in its first line, but {len(points)} follow; is it cut off?")
+    if claimed and sum(claimed) != len(points):
+        where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
+        raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(points)} follow; is it cut off?")
     return points
 
 
@@ -57,6 +60,19 @@ class _Lines:
             text = text.strip()
             if text:
                 yield text
+
+
+def _rows_of_blocks(rows, claimed):
+    """The rows of blocks, as scanners write several views, each under a line that says how many it has; adds those
+    numbers to `claimed`, which holds the first."""
+    while True:
+        yield from islice(rows, claimed[-1])
+        following = next(rows, "")
+        if not _is_count(following):
+            break
+        claimed.append(int(following))
+    if following:
+        yield from chain([following], rows)
 
 
 def _open(path):
@@ -104,6 +120,10 @@ def _named_columns(path, header):
         seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
         raise InputError(f"{path} has {len(names)} columns, named {seen}; name those of the coordinates x, y and z")
     return 0, 1, 2
+
+
+def _is_count(line):
+    return line.isdecimal() and len(line) < 19
 
 
 def _is_number(token):

@@ -105,6 +105,22 @@ def test_a_wrong_count_is_refused(folder, count):
     )
 
 
+def test_blocks_of_points_are_read_one_after_the_other(folder):
+    text = "2\n1 2 3\n4 5 6\n\n0\n# the next view\n1\n7 8 9\n"
+    assert read_points(written(folder, "scan.pts", text)).tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+
+
+@pytest.mark.parametrize("end", ["3\n7 8 9\n", "0\n7 8 9\n"])
+def test_a_wrong_count_of_a_block_is_refused(folder, end):
+    message = refusal(folder, "scan.pts", "2\n1 2 3\n4 5 6\n" + end)
+    assert f"says {2 + int(end[0])} points in 2 blocks, but 3 follow" in message
+
+
+def test_a_block_that_is_too_short_is_named_by_the_line_after_it(folder):
+    assert "line 3 is '2'" in refusal(folder, "scan.pts", "2\n1 2 3\n2\n4 5 6\n7 8 9\n")
+    assert "line 1 is '9" in refusal(folder, "scan.pts", "9" * 5000 + "\n1 2 3\n")
+
+
 @pytest.mark.parametrize("text", ["\n\n", "# only\n", "x y z\n", "0\n"])
 def test_no_points(folder, text):
     assert "holds no points" in refusal(folder, "scan.xyz", text)
