@@ -61,9 +61,9 @@ files in the folder OUT, named after the scan, each written whole or not at all:
                    from the surface) and foot (the nearest point of the surface)
   SCAN.json        settings, counts, seconds, warnings; written last
 All are in the scan's own units and place. Vertices of meshes have the properties distance (how far off the surface)
-and confidence (of the nearest sample); where SCAN is a .ply, meshes and points also carry what its points do: colours
-(red, green, blue), intensity and every other property that is one number, with scan_ before its name where it has one
-of those two.
+and confidence (of the nearest sample). Meshes and points also carry what the points of a .ply do, of a table whose
+columns have names or of a scanner's .pts: colours (red, green, blue), intensity and every other property that is one
+number, with scan_ before its name where it has one of those two.
 """
 
 

@@ -7,15 +7,15 @@ import numpy as np
 from bpy_extras.io_utils import ImportHelper
 
 from ..core.errors import VADError
-from ..core.io.points import read_points
-from . import datablocks
+from ..core.io.points import read_scan
+from . import attributes, datablocks
 from .outcome import centre
 
 EXTENSIONS = ".xyz", ".pts", ".txt", ".csv"
 
 
 class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
-    """Load points from text files, one a line, as meshes of loose vertices"""
+    """Load points from text files, one a line, with colours and other named columns, as meshes of loose vertices"""
 
     bl_idname = "vad.import_points"
     bl_label = "Import Points"
@@ -34,23 +34,26 @@ class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
     def execute(self, context):
         paths = [Path(self.directory, file.name) for file in self.files if file.name] or [Path(self.filepath)]
         try:
-            clouds = {path: read_points(path) for path in paths}
+            clouds = {path: read_scan(path) for path in paths}
         except VADError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         for other in context.selected_objects:
             other.select_set(False)
-        for path, points in clouds.items():
-            self._add(path.stem, points, context)
+        for path, (points, carried) in clouds.items():
+            self._add(path.stem, points, carried, context)
         return {"FINISHED"}
 
-    def _add(self, name, points, context):
+    def _add(self, name, points, carried, context):
         """A mesh object of loose vertices, placed at their centre: large coordinates keep their detail."""
-        finite = points[np.isfinite(points).all(axis=1)]
+        kept = np.isfinite(points).all(axis=1)
+        finite = points[kept]
         if len(finite) < len(points):
             self.report({"WARNING"}, f"{name}: {len(points) - len(finite)} points left out: not finite")
         origin = centre(finite) if len(finite) else np.zeros(3)
         obj = bpy.data.objects.new(name, datablocks.vertices_data(name, finite, origin))
+        found = attributes.of_file({name: values[kept] for name, values in carried.items()})
+        attributes.write(obj.data, {n: values for n, values in found.items() if n not in obj.data.attributes})
         obj.location = origin
         context.collection.objects.link(obj)
         obj.select_set(True)

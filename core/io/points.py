@@ -26,10 +26,10 @@ def _bare(read):
 
 READERS = {
     ".ply": _read_ply,
-    ".xyz": _bare(read_text),
-    ".pts": _bare(read_text),
-    ".txt": _bare(read_text),
-    ".csv": _bare(read_text),
+    ".xyz": read_text,
+    ".pts": read_text,
+    ".txt": read_text,
+    ".csv": read_text,
     ".npy": _bare(read_npy),
     ".npz": _bare(read_npz),
     ".obj": _bare(read_obj),
@@ -55,10 +55,14 @@ def read_points(path: str | os.PathLike) -> np.ndarray:
 
 
 def read_scan(path: str | os.PathLike) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """The points, as :func:`read_points` reads them, and their attributes by name, (n,) each, as stored.
+    """The points, as :func:`read_points` reads them, and their attributes by name, (n,) each.
 
-    Attributes are read from .ply alone: every property of the vertices that is one number (red, green, blue, intensity,
-    ...), but normals, which belong to the surface the points came from.
+    .ply                    : every property of the vertices that is one number (red, green, blue, intensity, ...), as
+                              stored
+    .xyz, .pts, .txt, .csv  : every further column with a name and a number in each row, float64, colours up to 255
+                              uint8; in .pts files of four or seven columns intensity, red, green and blue need no names
+
+    Normals are left out: they belong to the surface the points came from.
     """
     path = Path(path)
     try:

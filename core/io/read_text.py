@@ -10,29 +10,19 @@ from typing import TextIO
 import numpy as np
 
 from ..errors import InputError
+from .columns import XYZ, named_columns, unnamed_columns, with_colours_in_bytes
 
 _COMMA = re.compile(r"\d,\d")
 _UNIT = re.compile(r"\([^)]*\)|\[[^]]*\]")  # as in "X (m)"
 
 
-def read_text(path: Path) -> np.ndarray:
-    """(n,3) float64 from a table; see :func:`core.io.points.read_points` for what it may look like."""
-    with _open(path) as file:
-        lines = _Lines(file)
-        rows = iter(lines)
-        first = next(rows, "")
-        claimed, columns = [], (0, 1, 2)
-        if _is_count(first):
-            claimed.append(int(first))
-            rows = _rows_of_blocks(rows, claimed)
-            first = next(rows, "")
-        elif not any(map(_is_number, _split(first))):
-            columns, first = _named_columns(path, first), next(rows, "")
-        points = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), columns)
-    if claimed and sum(claimed) != len(points):
-        where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
-        raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(points)} follow; is it cut off?")
-    return points
+def read_text(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """(n,3) float64 from a table, see :func:`core.io.points.read_points` for what it may look like, and its further
+    columns by name, (n,) each, if all that start with a number have one in each row."""
+    try:
+        return _read(path, further=True)
+    except InputError:
+        return _read(path, further=False)
 
 
 def read_obj(path: Path) -> np.ndarray:
@@ -43,23 +33,56 @@ def read_obj(path: Path) -> np.ndarray:
 
 
 class _Lines:
-    """The lines that hold more than blanks and comments, stripped of both; remembers the last one handed out."""
+    """The lines that hold more than blanks and comments, stripped of both; remembers the last one handed out, and the
+    last comment on a line of its own."""
 
     def __init__(self, file: TextIO):
         self._file = file
         self.number = 0
         self.text = ""
+        self.comment = ""
 
     def __iter__(self) -> Iterator[str]:
         for number, text in enumerate(self._file, start=1):
             self.number, self.text = number, text
-            if "#" in text:
-                text = text.partition("#")[0]
-            if "//" in text:
-                text = text.partition("//")[0]
+            for mark in ("#", "//"):
+                if mark in text:
+                    text, _, self.comment = text.partition(mark)
             text = text.strip()
             if text:
                 yield text
+
+
+def _read(path, further):
+    with _open(path) as file:
+        lines, claimed, header = _Lines(file), [], None
+        rows = iter(lines)
+        first = next(rows, "")
+        if _is_count(first):
+            claimed.append(int(first))
+            rows = _rows_of_blocks(rows, claimed)
+            first = next(rows, "")
+        elif not any(map(_is_number, _split(first))):
+            header, first = first, next(rows, "")
+        columns = _columns(path, header, lines.comment, _split(first), further)
+        table = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), tuple(columns.values()))
+    if claimed and sum(claimed) != len(table):
+        where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
+        raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(table)} follow; is it cut off?")
+    attributes = dict(zip(list(columns)[3:], table.T[3:], strict=True))
+    return table[:, :3], with_colours_in_bytes(attributes)
+
+
+def _columns(path, header, comment, values, further):
+    """The columns to read, by name: x, y and z, then, where asked for, those with a number among the `values` of the
+    first row. A comment before it that names as many as there are is a header, as other programs write it."""
+    named = _split(_UNIT.sub("", comment if header is None else header))
+    if header is not None or (len(named) == len(values) and set("xyz") <= {name.lower() for name in named}):
+        columns = named_columns(path, named)
+    else:
+        columns = unnamed_columns(path, len(values))
+    numbers = [further and _is_number(value) for value in values]
+    return {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and numbers[c])}
 
 
 def _rows_of_blocks(rows, claimed):
@@ -86,7 +109,7 @@ def _open(path):
 def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
     first = next(rows := iter(rows), None)
     if first is None:
-        return np.empty((0, 3))
+        return np.empty((0, len(columns)))
     try:
         return np.loadtxt(chain([first], rows), delimiter=delimiter, usecols=columns, comments=None, ndmin=2)
     except ValueError as error:  # loadtxt takes one row at a time: the last one is the culprit
@@ -95,7 +118,7 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
         seen = seen if len(seen) <= 60 else seen[:60] + "..."
         raise InputError(
             f"{path}: line {lines.number} is {seen!r}; numbers x y z are expected in "
-            f"columns {', '.join(str(column + 1) for column in columns)}{remedy}"
+            f"columns {', '.join(str(column + 1) for column in columns[:3])}{remedy}"
         ) from error
 
 
@@ -109,17 +132,6 @@ def _delimiter(row):
 
 def _split(row):
     return [token.strip() for token in row.split(_delimiter(row))]
-
-
-def _named_columns(path, header):
-    """Where a line of names puts x, y and z, with units or not; three columns of other names are taken for them."""
-    names = [name.strip('" ').lower() for name in _split(_UNIT.sub("", header))]
-    if set("xyz") <= set(names):
-        return tuple(map(names.index, "xyz"))
-    if len(names) > 3:
-        seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
-        raise InputError(f"{path} has {len(names)} columns, named {seen}; name those of the coordinates x, y and z")
-    return 0, 1, 2
 
 
 def _is_count(line):

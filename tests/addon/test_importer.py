@@ -49,6 +49,25 @@ def test_points_that_are_nowhere_are_left_out_and_counted(blender, tmp_path, cap
     assert "Warning: holes: 1 points left out" in capfd.readouterr().out
 
 
+def test_colours_and_other_columns_come_along(blender, tmp_path):
+    rows = "0 0 0 .5 255 128 0\nnan 0 1 .5 1 2 3\n1 2 3 1 0 10 255\n"
+    (tmp_path / "scan.pts").write_text(rows)
+    blender.ops.vad.import_points(filepath=str(tmp_path / "scan.pts"))
+    found = blender.context.active_object.data.attributes
+    shown = np.array([value.color_srgb for value in found["Col"].data])
+    assert_allclose(shown * 255, [[255, 128, 0, 255], [0, 10, 255, 255]], atol=0.01)
+    assert [value.value for value in found["intensity"].data] == [0.5, 1]
+    assert not {"red", "green", "blue"} & set(found.keys())
+
+
+def test_columns_named_as_blenders_own_leave_those_alone(blender, tmp_path):
+    (tmp_path / "scan.csv").write_text("x,y,z,position,weight\n1,2,3,7,8\n3,2,1,7,8\n")
+    blender.ops.vad.import_points(filepath=str(tmp_path / "scan.csv"))
+    obj = blender.context.active_object
+    assert_allclose(coordinates(obj), [[1, 2, 3], [3, 2, 1]], atol=1e-6)
+    assert obj.data.attributes["weight"].data[1].value == 8
+
+
 def test_a_file_that_cannot_be_read_is_one_sentence_and_no_object(blender, tmp_path):
     (tmp_path / "bad.xyz").write_text("no numbers here\n")
     with pytest.raises(RuntimeError, match=r"bad\.xyz") as caught:

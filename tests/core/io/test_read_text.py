@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from core import InputError
-from core.io.points import read_points
+from core.io.points import read_points, read_scan
 
 numbers = st.floats(width=64, allow_nan=True, allow_infinity=True)
 
@@ -72,9 +72,46 @@ def test_tabs_and_units_do_not_hide_columns(folder, text):
 
 def test_many_columns_of_other_names_are_refused(folder):
     message = refusal(folder, "scan.csv", "Point,Easting,Northing,Elevation\n1,2,3,4\n")
-    assert "4 columns, named point, easting, northing, elevation; name those of the coordinates x, y and z" in message
+    assert "4 columns, named Point, Easting, Northing, Elevation; name those of the coordinates x, y and z" in message
     three = written(folder, "scan.csv", "Easting,Northing,Elevation\n1,2,3\n4,5,6\n")
     assert read_points(three).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("a.csv", "X,Y,Z,R,G,B,Scalar field\n1,2,3,9,8,7,.5\n4,5,6,0,255,6,1\n", "red green blue Scalar_field"),
+        ("a.txt", "//X Y Z Red Green Blue Intensity Nx Ny Nz\n1 2 3 9 8 7 .5 0 0 1\n4 5 6 0 255 6 1 0 0 1\n", "rgbi"),
+        ("a.xyz", "# x y z intensity\n1 2 3 .5\n4 5 6 1\n", "intensity"),
+        ("a.pts", "2\n1 2 3 .5 9 8 7\n4 5 6 1 0 255 6\n", "intensity red green blue"),
+        ("a.pts", "1 2 3 .5\n4 5 6 1\n", "intensity"),
+        ("a.csv", "intensity,z,label,x,y\n.5,3,wall,1,2\n1,6,floor,4,5\n", "intensity"),
+        ("a.xyz", "1 2 3 9 8 7\n4 5 6 0 255 6\n", ""),
+        ("a.xyz", "# x y z of the whole house\n1 2 3 9\n4 5 6 9\n", ""),
+        ("a.csv", "x,y,z,intensity\n1,2,3,.5\n4,5,6,\n", ""),
+        ("a.pts", "1 2 3 .1 .2 .3 1\n4 5 6 wall\n", ""),
+    ],
+)
+def test_named_columns_are_carried(folder, name, text, expected):
+    points, carried = read_scan(written(folder, name, text))
+    assert points.tolist() == [[1, 2, 3], [4, 5, 6]]
+    expected = "red green blue intensity" if expected == "rgbi" else expected
+    assert list(carried) == expected.split()
+    values = {"red": [9, 0], "green": [8, 255], "blue": [7, 6]}
+    for name, found in carried.items():
+        assert found.tolist() == values.get(name, [0.5, 1])
+        assert found.dtype == (np.uint8 if name in values else np.float64)
+
+
+def test_colours_that_are_no_bytes_stay_what_they_are(folder):
+    for red in (0.5, 256, -1, float("nan")):
+        carried = read_scan(written(folder, "scan.csv", f"x,y,z,r,g,b\n1,2,3,{red},0,1\n"))[1]
+        assert all(carried[name].dtype == np.float64 for name in ("red", "green", "blue"))
+        np.testing.assert_array_equal(carried["red"], [red])
+
+
+def test_no_points_but_names(folder):
+    assert "holds no points" in refusal(folder, "scan.csv", "x,y,z,intensity\n")
 
 
 def test_text_in_further_columns_is_ignored(folder):

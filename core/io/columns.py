@@ -1,0 +1,48 @@
+"""What the columns of a table of points hold, by name."""
+
+import re
+
+import numpy as np
+
+from ..errors import InputError
+
+XYZ = {"x": 0, "y": 1, "z": 2}
+_COLOUR = {"r": "red", "g": "green", "b": "blue"}
+_NO_NAME = re.compile(r"\W+", re.ASCII)  # what names of properties in PLY files may not have
+_OF_SCANNERS = {4: ("intensity",), 7: ("intensity", "red", "green", "blue")}
+
+
+def named_columns(path, names: list[str]) -> dict[str, int]:
+    """Where columns of these names are, x, y and z first; three of other names are taken for those. Raises
+    :class:`InputError` for more columns without them."""
+    columns = {}
+    for column, name in enumerate(names):
+        columns.setdefault(_plain(name), column)
+    if not XYZ.keys() <= columns.keys():
+        if len(names) > 3:
+            seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+            raise InputError(f"{path} has {len(names)} columns, named {seen}; name those of the coordinates x, y and z")
+        return XYZ
+    if _COLOUR.keys() <= columns.keys():
+        columns = {_COLOUR.get(name, name): column for name, column in columns.items()}
+    return {axis: columns.pop(axis) for axis in XYZ} | columns
+
+
+def unnamed_columns(path, count: int) -> dict[str, int]:
+    """The same where nothing names them: what scanners write to .pts files, else the coordinates alone."""
+    further = _OF_SCANNERS.get(count, ()) if path.suffix.lower() == ".pts" else ()
+    return XYZ | {name: column for column, name in enumerate(further, start=3)}
+
+
+def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The attributes, colours as uint8 where they are whole numbers from 0 to 255."""
+    colours = {name: values for name, values in attributes.items() if name in _COLOUR.values()}
+    if all(((values >= 0) & (values <= 255) & (values % 1 == 0)).all() for values in colours.values()):
+        attributes = attributes | {name: values.astype(np.uint8) for name, values in colours.items()}
+    return attributes
+
+
+def _plain(name):
+    name = _NO_NAME.sub("_", name.strip('" ')).strip("_") or "_"
+    known = {*XYZ, *_COLOUR, *_COLOUR.values(), "intensity", "nx", "ny", "nz"}
+    return name.lower() if name.lower() in known else name
