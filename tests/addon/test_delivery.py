@@ -55,6 +55,20 @@ def test_samples_and_surface_carry_what_the_source_carried(run, scan, sphere):
     assert_allclose(values(surface, "Col", "color", 4)[:, :3], 0.5 + 0.5 * sphere[label], atol=1e-6)
 
 
+def test_colours_and_intensity_of_a_scanners_file_reach_the_surface(blender, folder, sphere):
+    colours = np.rint(255 * (0.5 + 0.5 * sphere)).astype(int)
+    np.savetxt(folder / "scan.pts", np.column_stack([sphere, sphere[:, 2], colours]), header="500", comments="")
+    blender.ops.vad.import_points(filepath=str(folder / "scan.pts"))
+    blender.ops.vad.reconstruct(resolution=24)
+    made = {obj["vad_role"]: obj for obj in blender.context.scene.vad.result.objects}
+    surface = made["surface"].data
+    assert surface.color_attributes.active_color_name == "Col"
+    world = positions(surface) + np.array(made["surface"].location)
+    shown = values(surface, "Col", "color_srgb", 4)[:, :3]
+    assert np.abs(shown - (0.5 + 0.5 * world)).max() < 0.2  # 1.5 spacings
+    assert np.abs(values(surface, "intensity") - world[:, 2]).max() < 0.4
+
+
 def test_colours_of_a_ply_are_seen_on_the_surface(blender, folder, sphere):
     colours = np.rint(255 * (0.5 + 0.5 * sphere)).astype(int)
     names = ("float x", "float y", "float z", "uchar red", "uchar green", "uchar blue")
