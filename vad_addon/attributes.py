@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..core.io.columns import COLOURS
+
 _LAYOUT = {  # attribute type -> name of the value, width, NumPy type
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
@@ -14,7 +16,6 @@ _LAYOUT = {  # attribute type -> name of the value, width, NumPy type
     "FLOAT_COLOR": ("color", 4, np.float32),
     "BYTE_COLOR": ("color", 4, np.float32),
 }
-_CHANNELS = "red", "green", "blue"
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,13 @@ def write(data, attributes: dict[str, Attribute]) -> None:
 def of_file(carried: dict[str, np.ndarray]) -> dict[str, Attribute]:
     """What the points of a file carry, by name, (n,) each; red, green and blue up to 255 as one colour, named `Col` as
     by Blender's importer of .ply files."""
-    colours = [carried[name] for name in _CHANNELS if name in carried and carried[name].dtype == np.uint8]
-    if len(colours) < len(_CHANNELS):
+    colours = [carried[name] for name in COLOURS if name in carried and carried[name].dtype == np.uint8]
+    if len(colours) < len(COLOURS):
         return {name: Attribute.of(values) for name, values in carried.items()}
     shown = np.stack(colours, axis=1) / 255
     linear = np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)  # IEC 61966-2-1 (sRGB)
     opaque = np.append(linear, np.ones((len(shown), 1)), axis=1)
-    rest = {name: Attribute.of(values) for name, values in carried.items() if name not in _CHANNELS}
+    rest = {name: Attribute.of(values) for name, values in carried.items() if name not in COLOURS}
     return {"Col": Attribute("BYTE_COLOR", opaque.astype(np.float32)), **rest}
 
 

@@ -62,14 +62,14 @@ def with_sparser_parts_joined(
 
     points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
     """
-    cloud = points, normals, spacing, tree
+    progress, cloud = Progress.of(progress), (points, normals, spacing, tree)
     row = np.flatnonzero(rims.gap & ~rims.bridged)
     row = row[_near_steps(row, points, spacing, neighbours, _FURTHER * bridge)]
     usual = np.median(spacing[neighbours[row]], axis=1)
-    distance, other = _looked_across(row, rims.outward[row], *cloud, _FURTHER * bridge, progress, _MOST)
+    distance, other = _looked_across(row, rims.outward[row], *cloud, _FURTHER * bridge, progress.part(0.0, 0.9), _MOST)
     ordinary = distance <= bridge * spacing[other]
     row, usual, distance, other = row[ordinary], usual[ordinary], distance[ordinary], other[ordinary]
-    onward, beyond = _looked_across(other, rims.outward[row], *cloud, _WIDER * bridge, progress)
+    onward, beyond = _looked_across(other, rims.outward[row], *cloud, _WIDER * bridge, progress.part(0.9, 1.0))
     sparser = np.isfinite(onward) & (spacing[beyond] >= _SPARSER * usual)
     row, distance = row[sparser], distance[sparser]
     bridged, reach = rims.bridged.copy(), rims.reach.copy()

@@ -7,9 +7,10 @@ import numpy as np
 from ..errors import InputError
 
 XYZ = {"x": 0, "y": 1, "z": 2}
-_COLOUR = {"r": "red", "g": "green", "b": "blue"}
+COLOURS = "red", "green", "blue"
+_COLOUR = dict(zip("rgb", COLOURS, strict=True))
 _NO_NAME = re.compile(r"\W+", re.ASCII)  # what names of properties in PLY files may not have
-_OF_SCANNERS = {4: ("intensity",), 7: ("intensity", "red", "green", "blue")}
+_OF_SCANNERS = {4: ("intensity",), 7: ("intensity", *COLOURS)}
 
 
 def named_columns(path, names: list[str]) -> dict[str, int]:
@@ -36,7 +37,7 @@ def unnamed_columns(path, count: int) -> dict[str, int]:
 
 def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The attributes, colours as uint8 where they are whole numbers from 0 to 255."""
-    colours = {name: values for name, values in attributes.items() if name in _COLOUR.values()}
+    colours = {name: values for name, values in attributes.items() if name in COLOURS}
     if all(((values >= 0) & (values <= 255) & (values % 1 == 0)).all() for values in colours.values()):
         attributes = attributes | {name: values.astype(np.uint8) for name, values in colours.items()}
     return attributes
@@ -44,5 +45,5 @@ def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.nda
 
 def _plain(name):
     name = _NO_NAME.sub("_", name.strip('" ')).strip("_") or "_"
-    known = {*XYZ, *_COLOUR, *_COLOUR.values(), "intensity", "nx", "ny", "nz"}
+    known = {*XYZ, *_COLOUR, *COLOURS, "intensity", "nx", "ny", "nz"}
     return name.lower() if name.lower() in known else name

@@ -45,12 +45,15 @@ class _Lines:
     def __iter__(self) -> Iterator[str]:
         for number, text in enumerate(self._file, start=1):
             self.number, self.text = number, text
+            comment = ""
             for mark in ("#", "//"):
                 if mark in text:
-                    text, _, self.comment = text.partition(mark)
+                    text, _, comment = text.partition(mark)
             text = text.strip()
             if text:
                 yield text
+            elif comment:
+                self.comment = comment
 
 
 def _read(path, further):
@@ -77,7 +80,7 @@ def _columns(path, header, comment, values, further):
     """The columns to read, by name: x, y and z, then, where asked for, those with a number among the `values` of the
     first row. A comment before it that names as many as there are is a header, as other programs write it."""
     named = _split(_UNIT.sub("", comment if header is None else header))
-    if header is not None or (len(named) == len(values) and set("xyz") <= {name.lower() for name in named}):
+    if header is not None or (len(named) == len(values) and XYZ.keys() <= {name.lower() for name in named}):
         columns = named_columns(path, named)
     else:
         columns = unnamed_columns(path, len(values))

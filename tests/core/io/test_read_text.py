@@ -88,6 +88,7 @@ def test_many_columns_of_other_names_are_refused(folder):
         ("a.csv", "intensity,z,label,x,y\n.5,3,wall,1,2\n1,6,floor,4,5\n", "intensity"),
         ("a.xyz", "1 2 3 9 8 7\n4 5 6 0 255 6\n", ""),
         ("a.xyz", "# x y z of the whole house\n1 2 3 9\n4 5 6 9\n", ""),
+        ("a.xyz", "1 2 3 # z y x\n4 5 6 # z y x\n", ""),
         ("a.csv", "x,y,z,intensity\n1,2,3,.5\n4,5,6,\n", ""),
         ("a.pts", "1 2 3 .1 .2 .3 1\n4 5 6 wall\n", ""),
     ],
