@@ -26,11 +26,13 @@ from .noise_measure import (
     JET_NEIGHBOURS,
     NOISE,
     PCA_NEIGHBOURS,
+    SLIGHT,
     STRAYS,
     measure_between,
     measure_faint,
     measure_half,
     measure_noise,
+    measure_slight,
     measure_strays,
     share_noisy,
 )
@@ -99,6 +101,13 @@ CPU time of a whole run, median over the rows: alternation {alternating_cost:.1f
 Published CD, **on other shapes** and so no comparison but a scale, beside those here:
 
 {published}
+
+### Slight noise
+
+Noise of hundredths of the distance between points, about what rounding coordinates to a tenth of it adds. CD (HD).
+Where points are too sparse for some of the shape, noise below a twentieth is taken for detail and left.
+
+{slight}
 
 ### Noise in one half
 
@@ -218,6 +227,7 @@ def measure(cases: list[Case], others: list[Path], shape: Path) -> dict:
         "wires": [said(f"wires, {name}", noise_wires.measure(name)) for name in noise_wires.WIRES],
         "uneven": [said(name, noise_uneven.measure(name)) for name in noise_uneven.UNEVEN],
         "faint": [said(f"{case.name}, faint noise", measure_faint(case, *how)) for case in cases[:2] for how in FAINT],
+        "slight": [said(f"{case.name}, slight noise", measure_slight(case, level)) for case in cases for level in SLIGHT],
         "between": [said(f"{case.name}, {p} %", measure_between(case, p)) for case in cases for p in published.NOISE],
         "costs": list(_costs(others, shape)),
         **_stopping(),
@@ -291,6 +301,7 @@ def write_page(measured: dict, docs: Path) -> Path:
         taken=tables.listed(f"{share:.1%} of {name}" for name, share in measured["clean"].items() if share),
         strays=tables.markdown(tables.strays(measured["strays"])),
         published=tables.markdown(tables.beside_published(measured)),
+        slight=tables.markdown(tables.slight(measured["slight"])),
         faint=tables.markdown(tables.faint(measured["faint"])),
         wire_runs=noise_wires.RUNS,
         wires=tables.markdown(tables.wires(measured["wires"])),

@@ -21,6 +21,7 @@ NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 HALF_NOISE = 0.5
 FAINT = [("slab", 0.5, level) for level in (0.05, 0.1, 0.15, 0.2)]  # part, its share of the points, local spacings
 FAINT += [("cap", share, 0.4) for share in (0.04, 0.08)]
+SLIGHT = (0.01, 0.02, 0.03, 0.05, 0.08)  # local spacings
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24
@@ -150,6 +151,22 @@ def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
         "moved": moved[noisy_there[result.source_index]].mean(),
         "cd": cd_and_hd(result.surface, case.truth)["cd"],
         "cd_best": cd_and_hd(reconstruct(best, Settings(denoise=0)).surface, case.truth)["cd"],
+    }
+
+
+def measure_slight(case: Case, level: float) -> dict:
+    """What is made of noise of `level` median local spacings in every point: share of them moved, CD and HD, also with
+    no point moved and with all."""
+    deviation = level * np.median(local_spacing(case.points))
+    points = case.points + np.random.default_rng(0).normal(size=case.points.shape) * deviation
+    result, none, every = (reconstruct(points, Settings(denoise=strength)) for strength in ("auto", 0, 1))
+    return {
+        "case": case.name,
+        "level": level,
+        "moved": float((result.points != points[result.source_index]).any(axis=1).mean()),
+        "ours": cd_and_hd(result.surface, case.truth),
+        "none": cd_and_hd(none.surface, case.truth),
+        "every": cd_and_hd(every.surface, case.truth),
     }
 
 

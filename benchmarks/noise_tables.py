@@ -114,6 +114,12 @@ def faint(rows):
         )
 
 
+def slight(rows):
+    yield "case", "noise, local spacings", "moved", "here", "`denoise=0`", "`denoise=1`"
+    for row in rows:
+        yield row["case"], f"{row['level']:g}", f"{row['moved']:.0%}", *_cd_and_hd(row, ("ours", "none", "every"))
+
+
 def wires(rows):
     kinds = [(run["share"], run["clouds"]) for run in rows[0]["runs"]]
     yield "wires", *(f"{share:.0%}{' in clouds' if clouds else ''}" for share, clouds in kinds)

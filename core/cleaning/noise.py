@@ -33,6 +33,9 @@ _EVERYWHERE = 0.04  # local spacings: nine tenths of the regions of a noisy clou
 _LEVEL = 0.05  # local spacings: half of them are above this
 _GROWTH = 1.15  # from 12 to 20 neighbours noise hardly grows, detail that the samples miss does
 _AGREED = 0.96  # median confidence of normals that noise of a tenth of a local spacing does not reach
+_SLIGHT = 0.012  # local spacings: nine tenths of the regions of a slightly noisy cloud are above it
+_STEADY = 1.05  # from 20 to 32 neighbours slight noise grows less, detail that averaging would blunt more
+_TURNED = 2.5  # times the squared level, in local spacings, that slight noise takes off the confidence of normals
 _DROWNED = 0.3  # local spacings: above it 12 neighbours see too little of the noise for that comparison
 
 
@@ -51,7 +54,7 @@ class Noise:
 def looks_noisy(points, spacing, seed: int = 0) -> bool:
     """Whether samples (n,3) with local spacing (n,) are as far off quadrics as noisy ones are; quick, and less
     sure than :func:`noisy_samples`, which asks the normals as well."""
-    return len(points) >= MINIMUM_SAMPLES and _roughness(points, spacing, seed, Progress())[0]
+    return len(points) >= MINIMUM_SAMPLES and _roughness(points, spacing, seed, Progress()).whole
 
 
 def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
@@ -61,23 +64,28 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     12 and from 20 neighbours; unresolved detail grows. Sheets closer than their samples look like noise to the
     quadrics, but normals agree there from sample to sample, as in no noise.
 
-    A cloud is noisy as a whole where nearly all of it looks so. Otherwise its noisy parts are those that look so
-    around a core that is well above all limits and not small: creases and thin sheets look noisy in places.
+    A cloud is noisy as a whole where nearly all of it looks so; noise of hundredths of a local spacing, as of rounded
+    coordinates, counts where it grows no more up to 32 neighbours, either. Otherwise its noisy parts are those that
+    look so around a core that is well above all limits and not small: creases and thin sheets look noisy in places.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
         return clean
     progress = Progress.of(progress)
-    whole, suspect, relative, anchors, region = _roughness(points, spacing, seed, progress)
+    found = _roughness(points, spacing, seed, progress)
+    relative, anchors, region = found.relative, found.anchors, found.region
+    if found.whole:
+        agreement = _typical_agreement(points, spacing, seed, progress.part(0.1, 0.3))
+        turned = agreement < 1 - _TURNED * np.median(relative) ** 2
+        if (found.loud and agreement < _AGREED) or (found.slight and turned):
+            return ~clean
     least = max(_REGION, _SMALLEST_PART * len(anchors))
-    if not whole and suspect.sum() < least:
+    if found.suspect.sum() < least:
         return clean
 
-    if whole and _typical_agreement(points, spacing, seed, progress.part(0.1, 0.3)) < _AGREED:
-        return ~clean
     confidence = _agreement(points, spacing, progress.part(0.3, 0.9))
     agreement = np.median(confidence[anchors][region], axis=1)
-    suspect &= agreement < _AGREED
+    suspect = found.suspect & (agreement < _AGREED)
     core = suspect & (relative > _CORE_LEVEL) & (agreement < _CORE_AGREED)
     if core.sum() < least:
         return clean
@@ -104,17 +112,48 @@ def _agreement(points, spacing, progress):
     return mirrors.confidence(reflection_sweeps(mirrors, progress=progress.part(0.7, 1.0))[0])
 
 
+@dataclass(frozen=True)
+class _Roughness:
+    """How far samples lie off quadrics, and where that looks like noise.
+
+    loud, slight : whether the cloud as a whole looks noisy, or may be so by hundredths of a local spacing
+    suspect      : (m,) bool, which anchors look noisy     relative : (m,) how far these are off, local spacings
+    anchors      : (m,) rows of the samples                region   : (m,k) the anchors nearest to each
+    """
+
+    loud: bool
+    slight: bool
+    suspect: np.ndarray
+    relative: np.ndarray
+    anchors: np.ndarray
+    region: np.ndarray
+
+    @property
+    def whole(self) -> bool:
+        return self.loud or self.slight
+
+
 def _roughness(points, spacing, seed, progress):
-    """Whether samples look noisy as a whole, which anchors look so (m,), how far these are off, local spacings (m,);
-    the anchors (m,) and their regions (m,k)."""
     anchors, region = _anchors(points, seed)
-    fits = nested_quadrics(points, anchors, LADDER[:2], progress.part(0.0, 0.1))
-    fine, wide = (GAUSS * np.median(fit.left_out()[region], axis=1) for fit in fits)
+
+    def missed(sizes, part):
+        fits = nested_quadrics(points, anchors, sizes, part)
+        return [GAUSS * np.median(fit.left_out()[region], axis=1) for fit in fits]
+
+    fine, wide = missed(LADDER[:2], progress.part(0.0, 0.08))
     relative = wide / np.median(spacing[anchors][region], axis=1)
-    growth = wide / np.maximum(fine, np.finfo(float).tiny)
+    growth = _ratio(wide, fine)
     everywhere, level = np.percentile(relative, (10, 50))
-    whole = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
-    return bool(whole), _rough(relative, growth), relative, anchors, region
+    loud = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
+    slight = everywhere > _SLIGHT and np.median(growth) < _GROWTH
+    if slight:
+        (wider,) = missed(LADDER[2:3], progress.part(0.08, 0.1))
+        slight = np.median(_ratio(wider, wide)) < _STEADY
+    return _Roughness(bool(loud), bool(slight), _rough(relative, growth), relative, anchors, region)
+
+
+def _ratio(a, b):
+    return a / np.maximum(b, np.finfo(float).tiny)
 
 
 def _rough(relative, growth):

@@ -195,6 +195,10 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2, said=1.1, lost=0.0)
         "faint": [
             {"case": "one", "part": "cap", "share": 0.04, "level": 0.4, "moved": 0.0, "cd": 0.204, "cd_best": 0.199}
         ],
+        "slight": [
+            {"case": "one", "level": 0.03, "moved": 1.0}
+            | {way: {"cd": cd, "hd": 9.4} for way, cd in (("ours", 0.14), ("none", 0.43), ("every", 0.14))}
+        ],
         "between": [{"case": case, "percent": percent, "cd": 0.625} for case in CASES for percent in published.NOISE],
         "costs": [
             {
@@ -229,6 +233,7 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
     assert "taken for noisy: 25.0% of other, uniform." in page
     assert "| junk | refused | a·b·ccc" in page
     assert "| a helix | – / 0.0% | 81% / 0.2% |" in page
+    assert "| one | 0.03 | 100% | 0.140 (9) | 0.430 (9) | 0.140 (9) |" in page
     assert "| one | cap | 4% | 0.4 | 0% | 0.204 | 0.199 |" in page
     assert "| one | uniform | both | 512, band 4 | 30.0 | 25.0 | 1.20 | 110 | 100 | 1.10 |" in page
     assert "| 0.3 % noise | 0.62 | 0.62 | 0.62 | 1.20 | – |" in page

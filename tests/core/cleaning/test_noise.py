@@ -33,6 +33,32 @@ def test_noise_is_noticed_and_measured(share):
     assert np.median(estimate_noise(points).level) == pytest.approx(deviation, rel=0.2)
 
 
+@pytest.mark.parametrize("name", ["sphere", "moebius", "cylinder"])
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.08])
+def test_slight_noise_is_noticed(name, share):
+    points = noisy(CLEAN[name], share * np.median(local_spacing(CLEAN[name])))
+    assert looks_noisy(points, local_spacing(points))
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
+def test_rounded_coordinates_are_slight_noise():
+    points = shapes.torus(5000)
+    unit = 0.1 * np.median(local_spacing(points))
+    points = unit * np.rint(points / unit)
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
+def test_slight_noise_among_detail_that_averaging_would_blunt_stays():
+    points = shapes.square(3000)
+    spacing = 2 / np.sqrt(3000)
+    x, y = 2 * np.pi * points[:, :2].T / (10 * spacing)
+    heights = spacing * np.random.default_rng(0).normal(size=3000) * 0.02
+    flat, waved = points.copy(), points.copy()
+    flat[:, 2], waved[:, 2] = heights, heights + 0.4 * spacing * np.sin(x) * np.sin(y)
+    assert noisy_samples(flat, local_spacing(flat)).all()
+    assert not noisy_samples(waved, local_spacing(waved)).any()
+
+
 @pytest.mark.parametrize(
     ("shape", "share"), [(shapes.scattered_sphere(2000), 0.3), (shapes.torus(2000), 0.8), (shapes.moebius(1500), 0.3)]
 )

@@ -13,7 +13,7 @@ def noisy_sphere(deviation, n=5000):
     return points + np.random.default_rng(7).normal(size=points.shape) * deviation
 
 
-@pytest.mark.parametrize(("deviation", "factor"), [(0.005, 2.5), (0.02, 4.0), (0.04, 4.0)])
+@pytest.mark.parametrize(("deviation", "factor"), [(0.0015, 2.5), (0.005, 2.5), (0.02, 4.0), (0.04, 4.0)])
 def test_noisy_samples_come_closer_to_the_surface(deviation, factor):
     points = noisy_sphere(deviation)
     moved, done = denoise(points, local_spacing(points))
