@@ -227,7 +227,7 @@ def measure(cases: list[Case], others: list[Path], shape: Path) -> dict:
         "wires": [said(f"wires, {name}", noise_wires.measure(name)) for name in noise_wires.WIRES],
         "uneven": [said(name, noise_uneven.measure(name)) for name in noise_uneven.UNEVEN],
         "faint": [said(f"{case.name}, faint noise", measure_faint(case, *how)) for case in cases[:2] for how in FAINT],
-        "slight": [said(f"{case.name}, slight noise", measure_slight(case, level)) for case in cases for level in SLIGHT],
+        "slight": [said(f"{case.name}, slight noise", measure_slight(case, by)) for case in cases for by in SLIGHT],
         "between": [said(f"{case.name}, {p} %", measure_between(case, p)) for case in cases for p in published.NOISE],
         "costs": list(_costs(others, shape)),
         **_stopping(),

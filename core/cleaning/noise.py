@@ -37,6 +37,8 @@ _SLIGHT = 0.012  # local spacings: nine tenths of the regions of a slightly nois
 _STEADY = 1.05  # from 20 to 32 neighbours slight noise grows less, detail that averaging would blunt more
 _TURNED = 2.5  # times the squared level, in local spacings, that slight noise takes off the confidence of normals
 _DROWNED = 0.3  # local spacings: above it 12 neighbours see too little of the noise for that comparison
+_DETAIL = 1.2  # times that errors grow from 12 to 32 neighbours where averaging would blunt more than noise does
+_FLOODED = 0.4  # local spacings: above it noise itself grows so much
 
 
 @dataclass(frozen=True)
@@ -79,15 +81,14 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         turned = agreement < 1 - _TURNED * np.median(relative) ** 2
         if (found.loud and agreement < _AGREED) or (found.slight and turned):
             return ~clean
-    least = max(_REGION, _SMALLEST_PART * len(anchors))
-    if found.suspect.sum() < least:
+    if found.suspect.sum() < _least(anchors):
         return clean
 
     confidence = _agreement(points, spacing, progress.part(0.3, 0.9))
     agreement = np.median(confidence[anchors][region], axis=1)
     suspect = found.suspect & (agreement < _AGREED)
     core = suspect & (relative > _CORE_LEVEL) & (agreement < _CORE_AGREED)
-    if core.sum() < least:
+    if core.sum() < _least(anchors):
         return clean
     suspect &= core[region].any(axis=1)
     noisy = suspect[region[:, :_SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
@@ -144,12 +145,21 @@ def _roughness(points, spacing, seed, progress):
     relative = wide / np.median(spacing[anchors][region], axis=1)
     growth = _ratio(wide, fine)
     everywhere, level = np.percentile(relative, (10, 50))
+    suspect = _rough(relative, growth)
     loud = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
     slight = everywhere > _SLIGHT and np.median(growth) < _GROWTH
-    if slight:
+    if loud or slight or suspect.sum() >= _least(anchors):
         (wider,) = missed(LADDER[2:3], progress.part(0.08, 0.1))
-        slight = np.median(_ratio(wider, wide)) < _STEADY
-    return _Roughness(bool(loud), bool(slight), _rough(relative, growth), relative, anchors, region)
+        further = _ratio(wider, fine)
+        suspect &= ~_detailed(relative, further)
+        loud &= not _detailed(level, np.median(further))
+        slight &= np.median(_ratio(wider, wide)) < _STEADY
+    return _Roughness(bool(loud), bool(slight), suspect, relative, anchors, region)
+
+
+def _least(anchors):
+    """Anchors that the noisy part of a cloud has at least."""
+    return max(_REGION, _SMALLEST_PART * len(anchors))
 
 
 def _ratio(a, b):
@@ -159,6 +169,12 @@ def _ratio(a, b):
 def _rough(relative, growth):
     """Whether errors in local spacings, and their growth from 12 to 20 neighbours, are those of noise."""
     return (relative > _LEVEL) & ((growth < _GROWTH) | (relative > _DROWNED))
+
+
+def _detailed(relative, further):
+    """Whether errors in local spacings grow too much from 12 to 32 neighbours, by the factor `further`, for noise
+    alone; those that noise has drowned grow as well."""
+    return (further > _DETAIL) & (relative < _FLOODED)
 
 
 def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:

@@ -48,15 +48,24 @@ def test_rounded_coordinates_are_slight_noise():
     assert noisy_samples(points, local_spacing(points)).all()
 
 
+def waved(n, length, height, deviation):
+    """A square with waves and noise, both in spacings."""
+    points, spacing = shapes.square(n), 2 / np.sqrt(n)
+    x, y = 2 * np.pi * points[:, :2].T / (length * spacing)
+    points[:, 2] = height * np.sin(x) * np.sin(y) + deviation * np.random.default_rng(0).normal(size=n)
+    points[:, 2] *= spacing
+    return points
+
+
 def test_slight_noise_among_detail_that_averaging_would_blunt_stays():
-    points = shapes.square(3000)
-    spacing = 2 / np.sqrt(3000)
-    x, y = 2 * np.pi * points[:, :2].T / (10 * spacing)
-    heights = spacing * np.random.default_rng(0).normal(size=3000) * 0.02
-    flat, waved = points.copy(), points.copy()
-    flat[:, 2], waved[:, 2] = heights, heights + 0.4 * spacing * np.sin(x) * np.sin(y)
+    flat, waves = waved(3000, 10, 0.0, 0.02), waved(3000, 10, 0.4, 0.02)
     assert noisy_samples(flat, local_spacing(flat)).all()
-    assert not noisy_samples(waved, local_spacing(waved)).any()
+    assert not noisy_samples(waves, local_spacing(waves)).any()
+
+
+def test_waves_as_short_as_samples_can_show_are_detail():
+    waves = waved(2000, 4, 0.4, 0.0)
+    assert not noisy_samples(waves, local_spacing(waves)).any()
 
 
 @pytest.mark.parametrize(
