@@ -8,7 +8,8 @@ import numpy as np
 
 from ..points import finite_points
 from ..progress import Progress
-from .noise import LADDER, estimate_noise, noisy_samples
+from .noise import noisy_samples
+from .noise_level import LADDER, estimate_noise
 from .quadrics import fit_quadrics
 
 LONGEST_MOVE = 4.0  # standard deviations of the noise

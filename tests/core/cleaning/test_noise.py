@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from core.cleaning.noise import LADDER, estimate_noise, looks_noisy, noisy_samples
+from core.cleaning.noise import looks_noisy, noisy_samples
+from core.cleaning.noise_level import LADDER, estimate_noise
 from core.points import local_spacing
 from tests import shapes
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core import Cancelled
-from core.cleaning.noise import estimate_noise
+from core.cleaning.noise_level import estimate_noise
 from core.cleaning.positions import LONGEST_MOVE, denoise
 from core.points import local_spacing
 from tests import shapes
