@@ -23,6 +23,7 @@ from benchmarks.noise_measure import (
     STRAYS,
     by_peer,
     half_noisy,
+    measure_slight,
     measure_strays,
     noisy,
     share_noisy,
@@ -88,6 +89,19 @@ def test_strays_found_and_points_lost_are_told_apart(square, monkeypatch):
     clean = measure_strays(crossing, 0.0)
     assert clean["found"] is None
     assert clean["cd"] == clean["untreated_cd"] < 20
+
+
+def test_slight_noise_is_moved_as_all_noise_is(monkeypatch):
+    monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
+    monkeypatch.setattr(noise_measure, "Settings", partial(Settings, resolution=32))
+    truth = closed.torus().mesh
+    points, normals = surface_samples(truth, 3000, np.random.default_rng(1))[:2]
+    case = Case("torus", points, normals, truth, np.empty((0, 3)), {"category": "watertight"})
+    found = measure_slight(case, 0.08)
+    assert found["moved"] == 1.0
+    assert found["ours"] == found["every"]
+    assert found["ours"]["cd"] < found["none"]["cd"]
+    assert measure_slight(case, 0.0)["moved"] == 0.0
 
 
 @pytest.mark.parametrize("name", WIRES)

@@ -84,7 +84,7 @@ def test_noise_of_one_half_is_found_there(shape, share):
 
 
 def test_noise_of_a_large_cloud_is_told_from_close_sheets_in_a_few_places():
-    sheets = shapes.sheets(8000, gap=0.04)
+    sheets = shapes.sheets(8000, gap=0.036)
     assert looks_noisy(sheets, local_spacing(sheets))
     assert not noisy_samples(sheets, local_spacing(sheets)).any()
     points = shapes.torus(8000)
