@@ -15,7 +15,7 @@ _GROWTH = 1.15  # from few to more neighbours noise hardly grows, detail that th
 _DROWNED = 0.3  # local spacings: above it few neighbours see too little of the noise for that comparison
 _DETAIL = 1.2  # times that errors grow from few to many neighbours where averaging would blunt more than noise does
 _FLOODED = 0.4  # local spacings: above it noise itself grows so much
-_SLIGHT = 0.012  # local spacings: nine tenths of the regions of a slightly noisy cloud are above it
+_SLIGHT = 0.006  # local spacings: nine tenths of the regions of a slightly noisy cloud are above it
 _STEADY = 1.05  # from more to many neighbours slight noise grows less, detail that averaging would blunt more
 _SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
 

@@ -35,7 +35,7 @@ def test_noise_is_noticed_and_measured(share):
 
 
 @pytest.mark.parametrize("name", ["sphere", "moebius", "cylinder"])
-@pytest.mark.parametrize("share", [0.02, 0.05, 0.08])
+@pytest.mark.parametrize("share", [0.01, 0.02, 0.05, 0.08])
 def test_slight_noise_is_noticed(name, share):
     points = noisy(CLEAN[name], share * np.median(local_spacing(CLEAN[name])))
     assert looks_noisy(points, local_spacing(points))
