@@ -88,8 +88,8 @@ def measure_half(case: Case, percent: float) -> dict:
     """What is found and made of noise in one half: shares of either half that move, distances of the noisy half to the
     surface, x1e3, and CD, also with no point moved and with all."""
     points, half = half_noisy(case, percent)
-    result, none, every = (reconstruct(points, Settings(denoise=strength)) for strength in ("auto", 0, 1))
-    moved, there = (result.points != points[result.source_index]).any(axis=1), half[result.source_index]
+    result, none, every = _by_strength(points)
+    moved, there = _moved(result, points), half[result.source_index]
     return {
         "case": case.name,
         "percent": percent,
@@ -137,12 +137,11 @@ def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
     from_top = np.linalg.norm(points - points[points[:, 2].argmax()], axis=1)
     rank = -points[:, 0] if part == "slab" else from_top
     noisy_there = rank <= np.quantile(rank, share)
-    shift = np.random.default_rng(0).normal(size=points.shape) * level * np.median(local_spacing(points))
-    points = np.where(noisy_there[:, None], points + shift, points)
+    points = np.where(noisy_there[:, None], points + _shift(points, level), points)
     result, every = reconstruct(points), reconstruct(points, Settings(denoise=1, surface="none"))
     best, own = points.copy(), noisy_there[every.source_index]
     best[every.source_index[own]] = every.points[own]
-    moved = (result.points != points[result.source_index]).any(axis=1)
+    moved = _moved(result, points)
     return {
         "case": case.name,
         "part": part,
@@ -157,13 +156,12 @@ def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
 def measure_slight(case: Case, level: float) -> dict:
     """What is made of noise of `level` median local spacings in every point: share of them moved, CD and HD, also with
     no point moved and with all."""
-    deviation = level * np.median(local_spacing(case.points))
-    points = case.points + np.random.default_rng(0).normal(size=case.points.shape) * deviation
-    result, none, every = (reconstruct(points, Settings(denoise=strength)) for strength in ("auto", 0, 1))
+    points = case.points + _shift(case.points, level)
+    result, none, every = _by_strength(points)
     return {
         "case": case.name,
         "level": level,
-        "moved": float((result.points != points[result.source_index]).any(axis=1).mean()),
+        "moved": _moved(result, points).mean(),
         "ours": cd_and_hd(result.surface, case.truth),
         "none": cd_and_hd(none.surface, case.truth),
         "every": cd_and_hd(every.surface, case.truth),
@@ -174,6 +172,21 @@ def measure_between(case: Case, percent: float) -> dict:
     """CD of the surface with noise of a level that others have published figures for."""
     surface = reconstruct(noisy(case, percent)).surface
     return {"case": case.name, "percent": percent, "cd": cd_and_hd(surface, case.truth)["cd"]}
+
+
+def _shift(points, level):
+    """Noise (n,3) of `level` median local spacings."""
+    return np.random.default_rng(0).normal(size=points.shape) * level * np.median(local_spacing(points))
+
+
+def _by_strength(points):
+    """Runs with noisy points moved as by default, none and all."""
+    return [reconstruct(points, Settings(denoise=strength)) for strength in ("auto", 0, 1)]
+
+
+def _moved(result, points):
+    """Which of a run's points are not where they were given, (m,) bool."""
+    return (result.points != points[result.source_index]).any(axis=1)
 
 
 def _ours(case, points):

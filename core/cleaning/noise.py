@@ -30,8 +30,8 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     """(n,) bool: which samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
 
     Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise looks alike from
-    12 and from 20 neighbours; unresolved detail grows. Sheets closer than their samples look like noise to the
-    quadrics, but normals agree there from sample to sample, as in no noise.
+    12 and from 20 neighbours and, unless it is heavy, from 32; unresolved detail grows. Sheets closer than their
+    samples look like noise to the quadrics, but normals agree there from sample to sample, as in no noise.
 
     A cloud is noisy as a whole where nearly all of it looks so; noise of hundredths of a local spacing, as of rounded
     coordinates, counts where it grows no more up to 32 neighbours, either. Otherwise its noisy parts are those that
