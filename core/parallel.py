@@ -10,7 +10,7 @@ from .progress import Progress
 
 _AHEAD = 2  # chunks in work or waiting for it, per core
 _HELD = 16  # chunks begun and not yet handed on, per core: those behind a large one go on meanwhile
-_FEW = 2048  # rows, hardly worth a thread
+_FEW = 512  # rows, hardly worth a thread
 _MOST_CORES = 8  # more hardly gain, and each holds chunks in memory
 
 

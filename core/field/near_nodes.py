@@ -11,7 +11,7 @@ from .grid import Grid, node_strides
 from .local_surface import LocalSurface
 
 _MARGIN = 0.1  # cells, for surfaces blended of patches that differ
-_PIECE = 1 << 16  # pairs of sample and node at a time
+_PIECE = 1 << 18  # pairs of sample and node at a time
 _OFTEN = 40.0  # times that each node is asked, on average; a distance transform is quicker then
 _WIDE = 0.25  # of the box, that the patch of a sample reaches
 

@@ -38,19 +38,20 @@ _FREE_SWEEPS = 20
 _INERTIA = 0.25  # after the free sweeps each axis holds on to itself by this share, which ends two-cycles at creases
 
 
-def reflection_sweeps(mirrors: Mirrors, constraints=None, start=None, progress=None):
+def reflection_sweeps(mirrors: Mirrors, constraints=None, start=None, progress=None, most: int = MAX_SWEEPS):
     """Axes of samples from their Voronoi neighbours.
 
     constraints : (indices (k,), axes (k,3) unit) or None; these axes are never updated
     start       : (n,3) unit axes to begin with, or None
+    most        : sweeps after which axes that still turn are left at that
     Returns normals (n,3) float64 unit axes of arbitrary sign, and the number of sweeps.
     """
     progress = Progress.of(progress)
     normals = mirrors.plane_fit() if start is None else start.copy()
     fixed, axes = ([], np.empty((0, 3))) if constraints is None else constraints
     normals[fixed] = axes
-    for sweep in range(1, MAX_SWEEPS + 1):
-        progress(sweep / MAX_SWEEPS)
+    for sweep in range(1, most + 1):
+        progress(sweep / most)
         turned = sweep_once(mirrors, normals, sweep)
         turned[fixed] = axes
         cosine = np.abs(np.einsum("ni,ni->n", turned, normals))

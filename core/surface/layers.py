@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..field.grid import node_strides
 from ..linalg import cross, dots, lengths
 from ..parallel import in_order
 from ..progress import Progress
@@ -17,6 +18,7 @@ from .mesh import Mesh, at_corners
 _HAIR = 3e-4  # cells, between the layers
 _SHIFT = 0.5  # cells, by which layers are held apart in looking for faces of the other
 _NEAREST = 8  # faces that are tried
+_AROUND = 2.0  # cells, of a place, within which faces are looked at
 _REACH = 0.75  # cells, farther sheets are others
 _OPPOSITE = -0.5  # largest cosine between the normals of either layer
 _SLIVER = 1e-6  # squared cells, twice the area of faces that have no direction
@@ -56,13 +58,16 @@ def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
 def _other_layer(mesh, place, outward, cell, progress):
     """Along the lines through places (m,3), how far behind them the nearest face of the other layer lies, (m,) float64,
     inf where there is none within reach, and which it is, (m,)."""
-    corners = at_corners(mesh.vertices, mesh.faces)
+    behind, which = np.full(len(place), np.inf), np.zeros(len(place), np.intp)
+    if not len(place):
+        return behind, which
+    near = np.flatnonzero(_beside(mesh.vertices, place, _AROUND * cell)[mesh.faces].any(axis=1))
+    corners = at_corners(mesh.vertices, mesh.faces[near])
     normal = cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.maximum(lengths(normal), _SLIVER * cell**2)
     held = sum(corners) / 3 - _SHIFT * cell * normal
     progress(0.0)
     tree = KDTree(held.T, balanced_tree=False, compact_nodes=False)
-    behind, which = np.full(len(place), np.inf), np.zeros(len(place), np.intp)
 
     def look(part):
         at, way = place[part].T, outward[part].T
@@ -74,9 +79,18 @@ def _other_layer(mesh, place, outward, cell, progress):
         depth = -dots(a, other) / np.minimum(along, _OPPOSITE)  # of others, it does not count
         hit = (np.max(turns, axis=0) <= 0) & (along < _OPPOSITE) & (np.abs(depth) < _REACH * cell)
         nearest = np.where(hit, np.abs(depth), np.inf).argmin(axis=0), np.arange(face.shape[1])
-        which[part] = face[nearest]
+        which[part] = near[face[nearest]]
         behind[part] = np.where(hit[nearest], depth[nearest], np.inf)
 
     for _ in in_order(look, progress.chunks(len(place), _CHUNK)):
         pass
     return behind, which
+
+
+def _beside(x, places, side):
+    """Which of x (m,3) are in the same box of a lattice as one of places (p,3), or in one next to it, (m,) bool."""
+    lowest, highest = x.min(axis=0), x.max(axis=0)
+    strides = node_strides(((highest - lowest) // side).astype(np.int64) + 3)
+    box, home = (((each - lowest) / side).astype(np.int64) @ strides for each in (x, places))
+    around = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ strides
+    return np.isin(box, np.unique(home)[:, None] + around)

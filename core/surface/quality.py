@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..linalg import cross, dots, lengths
 from .mesh import Mesh, at_corners
 
 _SMALL = 5.0  # degrees
@@ -22,9 +23,11 @@ def triangle_quality(mesh: Mesh) -> dict:
     if not len(mesh.faces):
         return dict.fromkeys(names)
     corners = at_corners(mesh.vertices, mesh.faces)
-    squares = [((corners[k] - corners[k - 1]) ** 2).sum(axis=0) for k in range(3)]
-    short, middle, long = np.sort(squares, axis=0)
-    areas = mesh.face_areas()
+    sides = [corners[k] - corners[k - 1] for k in range(3)]
+    a, b, c = (dots(side, side) for side in sides)
+    short, long = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    middle = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
+    areas = 0.5 * lengths(cross(sides[1], sides[2]))
     angles = np.degrees(np.arctan2(4 * areas, middle + long - short))
     flatness = 4 / np.sqrt(3) * areas / np.maximum(long, np.finfo(float).tiny)  # one over the aspect ratio
     flattest = np.percentile(flatness, 5, method="lower")
@@ -52,21 +55,24 @@ def quad_quality(mesh: Mesh) -> dict:
     names = "quad_angle", "quad_aspect_p95", "quad_fold_p95", "quad_concave"
     if not mesh.pairs:
         return found | dict.fromkeys(names)
-    corners = mesh.vertices[mesh.quads]
-    ahead = np.roll(corners, -1, axis=1) - corners
-    back = np.roll(-ahead, 1, axis=1)
-    turn = np.cross(ahead, back)
-    angle = np.degrees(np.arctan2(np.linalg.norm(turn, axis=2), np.einsum("qki,qki->qk", ahead, back)))
-    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    sides = np.linalg.norm(ahead, axis=2)
-    evenness = sides.min(axis=1) / np.maximum(sides.max(axis=1), np.finfo(float).tiny)  # one over the aspect ratio
+    places = at_corners(mesh.vertices, mesh.quads)
+    ahead = [places[k - 3] - places[k] for k in range(4)]
+    turns = [cross(ahead[k - 1], ahead[k]) for k in range(4)]
+    angle = [_angle(turns[k], -dots(ahead[k - 1], ahead[k])) for k in range(4)]
+    normal = cross(places[2] - places[0], places[3] - places[1])
+    sides = [lengths(side) for side in ahead]
+    evenness = np.min(sides, axis=0) / np.maximum(np.max(sides, axis=0), np.finfo(float).tiny)  # one over the aspect
     least_even = np.percentile(evenness, 5, method="lower")
-    halves = turn[:, 1], turn[:, 3]
-    fold = np.arctan2(np.linalg.norm(np.cross(*halves), axis=1), np.einsum("qi,qi->q", *halves))
+    fold = _angle(cross(turns[1], turns[3]), dots(turns[1], turns[3]))
     values = (
-        angle.min(axis=1).mean(),
+        np.degrees(np.min(angle, axis=0).mean()),
         1 / least_even if least_even > 0 else None,
         np.percentile(np.degrees(fold), 95),
-        (np.einsum("qki,qi->qk", turn, normal) < 0).any(axis=1).mean(),
+        np.any([dots(turn, normal) < 0 for turn in turns], axis=0).mean(),
     )
     return found | {name: None if value is None else float(value) for name, value in zip(names, values, strict=True)}
+
+
+def _angle(product, cosine):
+    """Angles (m,) between vectors with cross products (3,m) and inner products (m,); 0 where one has no length."""
+    return np.arctan2(lengths(product), cosine + 0.0)  # which leaves no -0, half a turn

@@ -59,6 +59,13 @@ def test_a_piece_of_few_faces_or_samples_along_a_large_one_is_a_crumb(faces, eve
     assert len(found.vertices) == len(large[0]) + (len(small[0]) if kept else 0)
 
 
+@pytest.mark.parametrize(("faces", "kept"), [(23, False), (24, True)])
+def test_so_it_is_along_one_of_very_many_vertices(faces, kept):
+    large, small = strip(0, 12_000), strip(0.5, faces)
+    found = pieces_with_samples(joined(large, small), KDTree(large[0]), 1.0)
+    assert len(found.vertices) == len(large[0]) + (len(small[0]) if kept else 0)
+
+
 def test_a_small_piece_stays_where_one_of_its_samples_has_no_large_one():
     large, small = strip(0, 100), strip(1, 4)
     mesh = joined(large, small)
