@@ -5,6 +5,6 @@ class Counted:
     def __init__(self, surface):
         self.surface, self.count = surface, 0
 
-    def project(self, x, *how):
+    def project(self, x, progress=None):
         self.count += len(x)
-        return self.surface.project(x, *how)
+        return self.surface.project(x, progress)

@@ -14,7 +14,7 @@ from ..progress import Progress
 from .borders import excess
 from .diffusion import fused_axes, kernel_weights
 
-NEAREST = 10  # of a query, that it is projected with
+NEAREST = 12  # of a query, that it is projected with
 FROM_NODES = 8  # of a node: with fewer the field errs less, though meshes more
 CHUNK = 8192  # queries at a time
 UNCOVERED = 1.5  # the surface is never further from its nearest sample than this, local spacings (or the bridged reach)

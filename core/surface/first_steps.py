@@ -4,7 +4,6 @@ import numpy as np
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
-from ..field.projection import FROM_NODES
 from ..field.steps import NearBand
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
@@ -32,6 +31,6 @@ def first_steps(
 
     for _, (row, between) in in_order(read, even_chunks(len(x), _CHUNK, progress.part(0.0, 0.3))):
         step[row], rest[row] = between, False
-    found = surface.project(x[rest], progress.part(0.3, 1.0), FROM_NODES)
+    found = surface.project(x[rest], progress.part(0.3, 1.0))
     step[rest], past_rim[rest] = found.step, found.past_rim
     return step, past_rim

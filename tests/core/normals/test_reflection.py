@@ -124,6 +124,14 @@ def test_start_is_not_written_to():
     np.testing.assert_array_equal(start, before)
 
 
+def test_stops_after_the_sweeps_asked_for():
+    mirrors, start = mirrors_of(shapes.junction(300)), random_axes(300, 0)
+    three, count = reflection_sweeps(mirrors, start=start, most=3)
+    assert count == 3
+    once, _ = reflection_sweeps(mirrors, start=start, most=1)
+    np.testing.assert_array_equal(reflection_sweeps(mirrors, start=once, most=2)[0], three)
+
+
 def test_cancels():
     mirrors = mirrors_of(shapes.sphere(100))
     with pytest.raises(Cancelled):

@@ -4,7 +4,6 @@ import pytest
 from core.field.grid import fit_grid
 from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
-from core.field.projection import FROM_NODES
 from core.field.steps import NearBand
 from core.points import local_spacing
 from core.surface.first_steps import first_steps
@@ -43,7 +42,7 @@ def test_beside_the_rim_and_out_of_the_band_places_are_projected(hemisphere):
     for x in (places(grid, 0.0), places(grid, 4.0)):
         x = x[(x[:, 2] < 0) | (np.abs(np.linalg.norm(x, axis=1) - 1) > 3 * grid.spacing)]
         step, past_rim = first_steps(x, band, surface, grid)
-        expected = surface.project(x, nearest=FROM_NODES)
+        expected = surface.project(x)
         np.testing.assert_array_equal(past_rim, expected.past_rim)
         np.testing.assert_array_equal(step, expected.step)
 
@@ -53,4 +52,4 @@ def test_outside_the_box_places_are_projected(hemisphere):
     every = np.arange(np.prod(grid.shape))
     known = NearBand(every, surface.project(grid.positions(every)).step, np.zeros(len(every), bool))
     x = grid.origin + grid.spacing * np.array([[-0.5, 12, 12], [12, 12, grid.shape[2] - 0.4]])
-    np.testing.assert_array_equal(first_steps(x, known, surface, grid)[0], surface.project(x, nearest=FROM_NODES).step)
+    np.testing.assert_array_equal(first_steps(x, known, surface, grid)[0], surface.project(x).step)
