@@ -23,11 +23,9 @@ def triangle_quality(mesh: Mesh) -> dict:
     if not len(mesh.faces):
         return dict.fromkeys(names)
     corners = at_corners(mesh.vertices, mesh.faces)
-    sides = [corners[k] - corners[k - 1] for k in range(3)]
-    a, b, c = (dots(side, side) for side in sides)
-    short, long = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    middle = np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
-    areas = 0.5 * lengths(cross(sides[1], sides[2]))
+    squares = [((corners[k] - corners[k - 1]) ** 2).sum(axis=0) for k in range(3)]
+    short, middle, long = np.sort(squares, axis=0)
+    areas = mesh.face_areas()
     angles = np.degrees(np.arctan2(4 * areas, middle + long - short))
     flatness = 4 / np.sqrt(3) * areas / np.maximum(long, np.finfo(float).tiny)  # one over the aspect ratio
     flattest = np.percentile(flatness, 5, method="lower")
@@ -60,8 +58,8 @@ def quad_quality(mesh: Mesh) -> dict:
     turns = [cross(ahead[k - 1], ahead[k]) for k in range(4)]
     angle = [_angle(turns[k], -dots(ahead[k - 1], ahead[k])) for k in range(4)]
     normal = cross(places[2] - places[0], places[3] - places[1])
-    sides = [lengths(side) for side in ahead]
-    evenness = np.min(sides, axis=0) / np.maximum(np.max(sides, axis=0), np.finfo(float).tiny)  # one over the aspect
+    sides = np.sort([lengths(side) for side in ahead], axis=0)
+    evenness = sides[0] / np.maximum(sides[-1], np.finfo(float).tiny)  # one over the aspect ratio
     least_even = np.percentile(evenness, 5, method="lower")
     fold = _angle(cross(turns[1], turns[3]), dots(turns[1], turns[3]))
     values = (
