@@ -1,9 +1,11 @@
 """How noisy the samples are, and over how many neighbours the surface is best averaged, region by region."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from ..parallel import in_order
 from ..progress import Progress
 from .anchors import SMOOTHING, nearest_anchor, spread_anchors
 from .quadrics import nested_quadrics
@@ -45,9 +47,8 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     anchors, region = spread_anchors(points, seed)
     ladder = np.array([k for k in LADDER if k < len(points)])
     fits = nested_quadrics(points, anchors, ladder, progress.part(0.0, 0.9))
-    missed = np.array([np.sqrt(_regional_square(fit.left_out(), region)) for fit in fits])
-    squared = np.array([_regional_square(fit.height, region) for fit in fits])
-    leverage = np.array([np.median(fit.leverage[region], axis=1) for fit in fits])
+    seen = [errors for _, errors in in_order(partial(_regional_errors, region=region), fits)]
+    missed, squared, leverage = (np.array(errors) for errors in zip(*seen, strict=True))
     radius = np.array([fit.radius for fit in fits])
 
     every = np.arange(len(anchors))
@@ -65,6 +66,12 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
 def _first(holds):
     """First rung at which something holds (rungs, m), or the last rung, (m,)."""
     return np.where(holds.any(axis=0), holds.argmax(axis=0), len(holds) - 1)
+
+
+def _regional_errors(fit, region):
+    """Of quadrics at the anchors, over the region of each: error of the sample left out, squared height, leverage."""
+    missed = np.sqrt(_regional_square(fit.left_out(), region))
+    return missed, _regional_square(fit.height, region), np.median(fit.leverage[region], axis=1)
 
 
 def _regional_square(error, region):

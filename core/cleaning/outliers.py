@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree
 
+from ..parallel import even_chunks, in_order
 from ..points import SPACING_NEIGHBOURS, finite_points
 from ..progress import Progress
 from .quadrics import fit_quadrics
@@ -94,8 +95,9 @@ class _Surroundings:
         self.neighbours, curve = np.empty((n, _NEIGHBOURS + 1), np.int64), np.empty(n, bool)
         self.centre, self.along = np.empty((2, n, 3))
         tree = KDTree(points)
-        for part in progress.part(0.0, 0.9).chunks(n, _CHUNK):
-            distance, self.neighbours[part] = tree.query(points[part], k=_NEIGHBOURS + 1, workers=-1)
+
+        def look(part):
+            distance, self.neighbours[part] = tree.query(points[part], k=_NEIGHBOURS + 1)
             self.spacing[part] = distance[:, 1 : SPACING_NEIGHBOURS + 1].mean(axis=1)
             group = points[self.neighbours[part, 1:]]
             centre = group.mean(axis=1)
@@ -107,6 +109,9 @@ class _Surroundings:
             self.thickness[part] = extent[:, 0] / size
             curve[part] = extent[:, 1] < _CURVE * size
             off_plane[part] = np.abs(np.einsum("ni,ni->n", points[part] - centre, axes[:, :, 0]))
+
+        for _ in in_order(look, even_chunks(n, _CHUNK, progress.part(0.0, 0.9))):
+            pass
         for part in progress.part(0.9, 1.0).chunks(n, _CHUNK):
             theirs[part] = np.median(self.spacing[self.neighbours[part, 1:]], axis=1)
         theirs = np.maximum(theirs, np.finfo(float).tiny)

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from ..field.curvature import tangent_frames
 from ..linalg import COMPONENTS, dots, principal_axes, solve_positive
-from ..parallel import in_order
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 
 GAUSS = 1.4826  # standard deviations in a median absolute error
@@ -16,7 +16,7 @@ _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
-_CHUNK = 60_000  # neighbours
+_CHUNK, _QUERIED = 60_000, 300_000  # neighbours, fitted and asked for at a time
 
 # Where the moments 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy stand in the normal equations.
 _MOMENTS = np.array(
@@ -70,11 +70,15 @@ def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
     def fit(part):
         distance, index = tree.query(points[rows[part]], k=most)
         offset = [x.take(index) - x.take(rows[part])[:, None] for x in columns]
-        return [_fit([x[:, :k].copy() for x in offset], distance[:, :k].copy()) for k in sizes]
+        for quadrics, k in zip(found, sizes, strict=True):
+            for first in range(0, len(index), step := max(1, _CHUNK // k)):
+                some = slice(first, first + step)
+                piece = _fit([x[some, :k].copy() for x in offset], distance[some, :k].copy())
+                at = slice(part.start + first, min(part.start + first + step, part.stop))
+                quadrics.step[at], quadrics.height[at], quadrics.leverage[at], quadrics.radius[at] = piece
 
-    for part, pieces in in_order(fit, Progress.of(progress).chunks(len(rows), max(1, _CHUNK // most))):
-        for quadrics, piece in zip(found, pieces, strict=True):
-            quadrics.step[part], quadrics.height[part], quadrics.leverage[part], quadrics.radius[part] = piece
+    for _ in in_order(fit, even_chunks(len(rows), max(1, _QUERIED // most), Progress.of(progress))):
+        pass
     return found
 
 

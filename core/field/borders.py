@@ -22,7 +22,7 @@ from ..progress import Progress
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
-_OPPOSITE = np.cos(GAP / 2)  # least cosine, to the direction opposite to a gap, of what lies there
+OPPOSITE = float(np.cos(GAP / 2))  # least cosine, to the direction opposite to a gap, of what lies there
 _BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
 
 _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
@@ -126,44 +126,6 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     return Rims(gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, np.zeros(n), crease, limit)
 
 
-def excess(rims: Rims, sample, lateral, spacing) -> tuple[np.ndarray, np.ndarray]:
-    """How far foot points lie outside the patches of given samples, along the tangent plane.
-
-    sample : (m,k) int     lateral : (3,m,k) tangential offset from the sample     spacing : (m,k) of the sample
-    Returns the distance (m,k) to the patch and the step (3,m,k) that leads out of it (its length is the distance).
-    """
-    length = np.sqrt(lateral[0] ** 2 + lateral[1] ** 2 + lateral[2] ** 2)
-    radius = DISC * spacing
-    gap = np.nonzero(rims.gap.take(sample))
-    owner = sample[gap]
-    along = np.einsum("ig,gi->g", lateral[:, *gap], rims.outward[owner])
-    open_side = along > length[gap] * rims.opening[owner]
-    radius[gap] = np.where(open_side & rims.bridged[owner], rims.reach[owner], radius[gap])
-    opposite = along < -_OPPOSITE * length[gap]
-    radius[gap] = np.where(opposite, np.maximum(radius[gap], rims.behind[owner]), radius[gap])
-    beyond = np.maximum(length - radius, 0)
-    step = lateral * (beyond / np.maximum(length, np.finfo(length.dtype).tiny))
-
-    at_rim = tuple(index[open_side & ~rims.bridged[owner]] for index in gap)
-    owner = sample[at_rim]
-    to_edge, edge_distance, past = _past_edges(lateral[:, *at_rim].T, rims.ends[owner], rims.margin[owner])
-    _replace_where_worse(beyond, step, at_rim, past, to_edge * (past / np.where(past > 0, edge_distance, 1))[:, None])
-
-    at_crease = np.nonzero(np.isfinite(rims.limit[:, 0]).take(sample))
-    creased = sample[at_crease]
-    across = np.einsum("im,mci->mc", lateral[:, *at_crease], rims.crease[creased])
-    over = np.einsum("mc,mci->mi", np.maximum(across - rims.limit[creased], 0), rims.crease[creased])
-    _replace_where_worse(beyond, step, at_crease, np.linalg.norm(over, axis=1), over)
-    return beyond, step
-
-
-def _replace_where_worse(beyond, step, place, distance, way):
-    """Put larger distances (p,) and their steps (p,3) at the indices `place`."""
-    worse = distance > beyond[place]
-    place = tuple(index[worse] for index in place)
-    beyond[place], step[:, *place] = distance[worse], way[worse].T
-
-
 def one_sheet(step, normals, other_normals) -> np.ndarray:
     """Whether samples with steps (...,3) between them lie on one sheet that is nearly flat there, (...) bool."""
     return _level(step, normals, other_normals) & _aligned(normals, other_normals, _FLAT)
@@ -260,15 +222,3 @@ def chain_lengths(rims: Rims, marked) -> np.ndarray:
     tail, head = tail[marked[head]], head[marked[head]]
     _, chain = connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)
     return np.bincount(chain)[chain]
-
-
-def _past_edges(lateral, ends, margin):
-    """Of the two segments [0, end], whose margins (m,3) change along them evenly, the one that `lateral` is least far
-    out of the margin of: step (m,3) from it, its length and how far out, (m,)."""
-    squared = np.maximum(np.einsum("mei,mei->me", ends, ends), np.finfo(float).tiny)
-    along = np.clip(np.einsum("mi,mei->me", lateral, ends) / squared, 0.0, 1.0)
-    steps = lateral[:, None] - along[..., None] * ends
-    length = np.linalg.norm(steps, axis=2)
-    past = length - (1 - along) * margin[:, :1] - along * margin[:, 1:]
-    chosen = np.arange(len(steps)), past.argmin(axis=1)
-    return steps[chosen], length[chosen], np.maximum(past[chosen], 0)

@@ -11,6 +11,7 @@ from ..progress import Progress
 from .borders import Rims, find_rims
 from .curvature import bending, tangent_frames
 from .line_gaps import with_line_gaps_bridged
+from .patches import Patches
 from .projection import NEAREST, Projection, project
 from .rim_lines import with_rim_lines
 from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
@@ -55,6 +56,10 @@ class LocalSurface:
         bend = np.stack([self.bend[:, a, b] for a, b in COMPONENTS])
         single = (np.ascontiguousarray(each, np.float32) for each in (self.normals.T, bend, self.spacing))
         return Columns(np.ascontiguousarray(self.points.T), *single)
+
+    @cached_property
+    def patches(self) -> Patches:
+        return Patches.of(self.rims)
 
     def project(self, x: np.ndarray, progress=None, nearest: int = NEAREST) -> Projection:
         """Where queries (m,3) close to the surface fall on it, see :func:`project`."""

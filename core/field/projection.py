@@ -11,7 +11,6 @@ import numpy as np
 from ..linalg import dots
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
-from .borders import excess
 from .diffusion import fused_axes, kernel_weights
 
 NEAREST = 12  # of a query, that it is projected with
@@ -165,7 +164,7 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     bent = np.stack([dots(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
     above = (height - 0.5 * dots(lateral, bent)) / np.sqrt(1 + dots(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height)
-    patch = excess(surface.rims, sample, lateral, spacing)
+    patch = surface.patches.excess(sample, lateral, spacing)
     return Nearby(sample, distance, spacing, offset, normals, height, above, kernel, pull, *patch)
 
 

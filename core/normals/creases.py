@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..progress import Progress
-from .mirrors import Mirrors, mirrored
+from .mirrors import Mirrors
 from .reflection import sweep_once
 
 _NEIGHBOURS = 20  # of a sample, that may lie on its sheet
@@ -59,7 +59,7 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
 def _agreed(mirrors, normals, free):
     """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
     agreed = mirrors.gather @ _alike(mirrors.cosines(normals))
-    rise = mirrors.gather @ np.abs(_cosine(normals[mirrors.site], mirrors.direction))
+    rise = mirrors.gather @ np.abs(mirrors.rises(normals))
     return agreed, (agreed < _AGREED) & (rise > _STEEP) & free
 
 
@@ -104,7 +104,8 @@ def _densest(row, points, spacing, tree, normals, agreed):
     distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
     distance, other = distance[:, 1:], other[:, 1:]
     direction = (points[other] - points[row, None]) / distance[..., None]
-    images = mirrored(normals[other], direction)
+    images = normals[other]
+    images -= 2 * _cosine(images, direction)[..., None] * direction
     near = np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
     weight = near * np.maximum(agreed[other], np.finfo(float).tiny)
 

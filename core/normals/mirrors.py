@@ -5,7 +5,7 @@ from copy import copy
 import numpy as np
 from scipy import sparse
 
-from ..linalg import outer, principal_axes
+from ..linalg import COMPONENTS, dots, principal_axes
 from ..progress import Progress
 from ..voronoi.facets import Facets
 
@@ -19,6 +19,9 @@ class Mirrors:
     points  : (n,3) float64
     spacing : (n,) float64, local spacing of each sample, units of `points`
     facets  : Facets between them
+
+    site, other, weight : (p,), a sample, one of its neighbours and that one's weight
+    direction : (3,p) float64, unit vectors from the one to the other
 
     Distances below a quarter of a local spacing count as that much. Two samples almost on top of each other would
     otherwise hear little but one another, and any two axes across their direction that mirror each other would stay as
@@ -36,14 +39,14 @@ class Mirrors:
         weight = np.tile(facets.area, 2) / np.maximum(length, nearest)
         total = np.bincount(self.site, weights=weight, minlength=len(points))
         self.weight = weight / np.where(total > 0, total, 1.0)[self.site]
-        self.direction = step / length[:, None]
+        self.direction = np.ascontiguousarray((step / length[:, None]).T)
         progress(0.5)
         self._gather(len(points))
 
     def _gather(self, count):
         rows = self.site, np.arange(len(self.weight))
         self.gather = sparse.csr_matrix((self.weight, rows), shape=(count, len(self.weight)))
-        self.alignment = self.gather @ outer(self.direction)
+        self.alignment = self._tensors(self.direction)
 
     def without(self, cut: np.ndarray) -> "Mirrors":
         """The same without some of the neighbours, `cut` (p,) bool; samples left with hardly any weight
@@ -66,7 +69,7 @@ class Mirrors:
         """The same with the neighbours of some samples alone, `sites` (n,) bool."""
         chosen, fewer = np.flatnonzero(sites[self.site]), copy(self)
         fewer.site, fewer.other = self.site[chosen], self.other[chosen]
-        fewer.weight, fewer.direction = self.weight[chosen], self.direction[chosen]
+        fewer.weight, fewer.direction = self.weight[chosen], self.direction[:, chosen]
         fewer._gather(len(sites))
         return fewer
 
@@ -75,18 +78,30 @@ class Mirrors:
         return principal_axes(-self.alignment)[0]
 
     def images(self, normals: np.ndarray) -> np.ndarray:
-        """(p,3) mirror images of each neighbour's axis in the bisector plane."""
-        return mirrored(normals[self.other], self.direction)
+        """(3,p) mirror images of each neighbour's axis in the bisector plane."""
+        axes = _at(self.other, normals)
+        return axes - 2 * dots(axes, self.direction) * self.direction
+
+    def agreement(self, normals: np.ndarray) -> np.ndarray:
+        """(n,6) mean over the neighbours of each sample of the images' v v^T."""
+        return self._tensors(self.images(normals))
 
     def cosines(self, normals: np.ndarray) -> np.ndarray:
         """(p,) cosines between each sample's axis and those images."""
-        return np.einsum("pi,pi->p", normals[self.site], self.images(normals))
+        return dots(_at(self.site, normals), self.images(normals))
+
+    def rises(self, normals: np.ndarray) -> np.ndarray:
+        """(p,) cosines between each sample's axis and the directions of its neighbours."""
+        return dots(_at(self.site, normals), self.direction)
 
     def confidence(self, normals: np.ndarray) -> np.ndarray:
         """(n,) in [0,1], mean squared cosine between an axis and the mirror images of its neighbours."""
         return np.clip(self.gather @ self.cosines(normals) ** 2, 0.0, 1.0)
 
+    def _tensors(self, vectors):
+        return np.stack([self.gather @ (vectors[a] * vectors[b]) for a, b in COMPONENTS], axis=1)
 
-def mirrored(axes: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Mirror images of axes (...,3) in planes across unit directions (...,3)."""
-    return axes - 2 * np.einsum("...i,...i->...", axes, direction)[..., None] * direction
+
+def _at(samples, normals):
+    """Rows of axes (n,3), component by component."""
+    return np.stack([column.take(samples) for column in normals.T])

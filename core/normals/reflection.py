@@ -64,5 +64,5 @@ def reflection_sweeps(mirrors: Mirrors, constraints=None, start=None, progress=N
 def sweep_once(mirrors: Mirrors, normals: np.ndarray, sweep: int, rows=slice(None)) -> np.ndarray:
     """The axes (n,3) after a sweep, counted from 1; of some `rows` (n,) bool alone where given."""
     inertia = _INERTIA if sweep > _FREE_SWEEPS else 0.0
-    agreement = mirrors.gather @ outer(mirrors.images(normals))
-    return principal_axes((agreement - mirrors.alignment + inertia * outer(normals))[rows])[0]
+    tensors = mirrors.agreement(normals) - mirrors.alignment + inertia * outer(normals)
+    return principal_axes(tensors[rows])[0]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..linalg import cross, lengths
@@ -71,21 +71,34 @@ def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
 def edge_numbers(faces: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Number of the edge from each corner to the next of triangles or quads (f,k) over n vertices, (f,k) int, and how
     many faces each edge has, (e,) int; numbered as in :func:`edges_of`."""
-    tail, head = faces.astype(np.int64), np.roll(faces, -1, axis=1)
-    key = np.minimum(tail, head) * n + np.maximum(tail, head)
-    _, edge, count = np.unique(key.reshape(-1), return_inverse=True, return_counts=True)
-    return edge.reshape(faces.shape), count
+    table = edge_table(faces, n)
+    count, table.data = table.data, np.arange(len(table.data))
+    return looked_up(table, faces, np.roll(faces, -1, axis=1)), count
 
 
 def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices (v,3) that faces (f,k) have, and the faces with their numbers."""
-    used, corners = np.unique(faces, return_inverse=True)
-    return vertices[used], corners.reshape(faces.shape)
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    return vertices[used], (np.cumsum(used) - 1)[faces]
 
 
 def edges_of(faces: np.ndarray, n: int) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Both ends, (e,) int64 each and the lower one first, of the edges of triangles or quads (f,k) over n vertices, in
     order, and how many faces each edge has, (e,) int."""
-    tail, head = (ends.reshape(-1).astype(np.int64) for ends in (faces, np.roll(faces, -1, axis=1)))
-    key, count = np.unique(np.minimum(tail, head) * n + np.maximum(tail, head), return_counts=True)
-    return np.divmod(key, n), count
+    table = edge_table(faces, n)
+    return (np.repeat(np.arange(n), np.diff(table.indptr)), table.indices.astype(np.int64)), table.data
+
+
+def edge_table(faces: np.ndarray, n: int) -> csr_matrix:
+    """How many faces each edge of triangles or quads (f,k) over n vertices has, (n,n) sparse, at its lower end and its
+    higher one. Entries are in order; counting them so is some times as quick as sorting numbers of edges."""
+    tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    ends = np.minimum(tail, head), np.maximum(tail, head)
+    return coo_matrix((np.ones(len(tail), np.int32), ends), shape=(n, n)).tocsr()
+
+
+def looked_up(table: csr_matrix, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
+    """What a table of edges holds for those between vertices `tail` and `head`, of one shape; 0 where it has none."""
+    low, high = np.minimum(tail, head).reshape(-1), np.maximum(tail, head).reshape(-1)
+    return np.asarray(table[low, high]).reshape(tail.shape)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .evening import FLAT, vertex_normals
-from .mesh import Mesh, at_corners
+from .mesh import Mesh, at_corners, edge_table, looked_up
 
 _EVEN = 1.5  # times the other's squared length, that a diagonal may have
 _CURVED = 0.004  # of the length, by which the eightfold rise must differ
@@ -30,13 +30,10 @@ def triangles(vertices, faces):
     told = np.maximum(length, other_length) < _EVEN * np.minimum(length, other_length)
     told &= (np.abs(rise - other_rise) > _CURVED * np.sqrt(length)) & (least[faces] >= FLAT).all(axis=1)
     other = np.where(told, other_rise < rise, other_length < length)
-    taken = _keys(faces[:, [0, 1, 2, 3]], faces[:, [1, 2, 3, 0]], len(vertices)).reshape(-1)
-    diagonals = np.stack(
-        [_keys(faces[:, 0], faces[:, 2], len(vertices)), _keys(faces[:, 1], faces[:, 3], len(vertices))], axis=1
-    )
-    clash = np.isin(diagonals, np.intersect1d(diagonals, taken))
+    clash = looked_up(edge_table(faces, len(vertices)), faces[:, :2], faces[:, 2:]) > 0
     other = np.where(clash[:, 0] != clash[:, 1], clash[:, 0], other)
-    chosen = np.take_along_axis(diagonals, other[:, None].astype(int), axis=1)[:, 0]
+    tail, head = (np.where(other, faces[:, k + 1], faces[:, k]).astype(np.int64) for k in (0, 2))
+    chosen = np.minimum(tail, head) * len(vertices) + np.maximum(tail, head)
     _, first, count = np.unique(chosen, return_index=True, return_counts=True)
     repeated = np.setdiff1d(np.flatnonzero(np.isin(chosen, chosen[first[count > 1]])), first)
     other[repeated] = ~other[repeated]
@@ -49,7 +46,3 @@ def _diagonal(places, normals):
     the normals there."""
     (a, b), (na, nb) = places, normals
     return np.einsum("if,if->f", b - a, b - a), np.abs(np.einsum("if,if->f", b - a, nb - na))
-
-
-def _keys(tail, head, n):
-    return np.minimum(tail, head) * n + np.maximum(tail, head)

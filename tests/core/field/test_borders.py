@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from core.field.borders import DISC, excess, find_rims
+from core.field.borders import DISC, find_rims
 from core.field.curvature import tangent_frames
 from core.field.local_surface import patch_neighbours
+from core.field.patches import Patches
 from core.points import local_spacing
 from tests import shapes
 
@@ -72,7 +73,7 @@ class TestExcess:
     def at(self, points, sample, lateral, bridge=3.0):
         rims, spacing = rims_of(points, UP, bridge)
         sample = np.full((len(lateral), 1), sample)
-        beyond, step = excess(rims, sample, np.asarray(lateral).T[:, :, None], spacing[sample])
+        beyond, step = Patches.of(rims).excess(sample, np.asarray(lateral).T[:, :, None], spacing[sample])
         return beyond[:, 0], step[:, :, 0].T, spacing[sample[0, 0]]
 
     def test_inside_its_disc_a_sample_covers_and_beyond_it_the_distance_to_the_disc_counts(self):

@@ -4,10 +4,11 @@ from scipy.spatial import KDTree
 
 from core import Settings, reconstruct
 from core.field import line_gaps
-from core.field.borders import excess, find_rims
+from core.field.borders import find_rims
 from core.field.curvature import tangent_frames
 from core.field.line_gaps import with_line_gaps_bridged
 from core.field.local_surface import patch_neighbours
+from core.field.patches import Patches
 from core.points import local_spacing
 from tests import shapes
 
@@ -53,7 +54,7 @@ def test_past_the_outermost_lines_nothing_is_covered(random):
     assert len(own) > 80
     for way, covered in ((0.5, 0.0), (-0.5, 1.0)):
         steps = np.tile([[way * APART, 0.0, 0.0]], (len(own), 1))
-        beyond, _ = excess(after, own[:, None], steps.T[:, :, None], spacing[own][:, None])
+        beyond, _ = Patches.of(after).excess(own[:, None], steps.T[:, :, None], spacing[own][:, None])
         assert np.mean(beyond[:, 0] < 1e-9) == pytest.approx(covered, abs=0.1)
 
 
@@ -63,7 +64,7 @@ def test_patches_cover_the_gap_behind_and_no_more(random):
     own = int(np.flatnonzero(inside(points) & (rims.behind > 0) & ~rims.bridged)[0])
     steps = rims.behind[own] * np.array([-0.9, -1.2, 0.9])[:, None] * rims.outward[own]
     sample = np.full((3, 1), own)
-    beyond, _ = excess(rims, sample, steps.T[:, :, None], spacing[sample])
+    beyond, _ = Patches.of(rims).excess(sample, steps.T[:, :, None], spacing[sample])
     assert beyond[0] == 0
     assert beyond[1] == pytest.approx(0.2 * rims.behind[own])
     assert beyond[2] > 0.3 * rims.behind[own]

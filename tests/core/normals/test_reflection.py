@@ -171,8 +171,8 @@ def test_axes_given_at_the_ends_of_a_flowers_petals_twist_them_smoothly():
 def quadratic_misfit(mirrors, normals):
     """What a fixed point of the sweeps minimises axis by axis, summed over the samples."""
     normals_at = normals[mirrors.site]
-    image = np.einsum("pi,pi->p", normals_at, mirrors.images(normals))
-    out_of_plane = np.einsum("pi,pi->p", normals_at, mirrors.direction)
+    image = np.einsum("pi,ip->p", normals_at, mirrors.images(normals))
+    out_of_plane = np.einsum("pi,ip->p", normals_at, mirrors.direction)
     return float((mirrors.gather @ (1 - image**2 + out_of_plane**2)).sum())
 
 
