@@ -33,9 +33,9 @@ class Feet:
     def tree(self) -> KDTree:
         return KDTree(self.centres.T, balanced_tree=False, compact_nodes=False)
 
-    def squared(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """Squared distances from x (3,...) float32 to the feet number `row` (...) themselves."""
-        return sum((x_a - centre.take(row)) ** 2 for x_a, centre in zip(x, self.centres, strict=True))
+    def offsets(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
+        """To x (3,...) float32 from the feet number `row` (...), (3,...)."""
+        return np.stack([x_a - centre.take(row) for x_a, centre in zip(x, self.centres, strict=True)])
 
     def distance(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Distances from x (3,...) float32 to the discs number `row` (...)."""

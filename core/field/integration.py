@@ -9,11 +9,13 @@ Danielsson, Computer Graphics and Image Processing 14, 1980). The distance is th
 the least of many discs' is too small where the feet scatter.
 """
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from ..linalg import dots
 from ..parallel import in_order
 from ..progress import Progress
 from .feet import no_farther_than_feet, settled_feet
@@ -53,46 +55,82 @@ def distance_field(
 
 
 def _transport(grid, node, feet, progress):
-    held = np.full(grid.shape, -1, np.int32)
-    held.flat[node] = np.arange(len(node), dtype=np.int32)
-    progress(0.0)
-    nearest = distance_transform_edt(held < 0, return_distances=False, return_indices=True)
-    row, squared, values = np.empty_like(held), np.empty(grid.shape, np.float32), np.empty(grid.shape, np.float32)
-    slabs, steps = _slabs(grid), _ROUNDS + 2
+    slabs = _slabs(grid)
+    row = _closest(grid, node, feet, slabs, progress.part(0.0, 0.9))
+    values = np.empty(grid.shape, np.float32)
 
-    def begin(slab):
-        row[slab] = held.take(np.ravel_multi_index(tuple(nearest[:, slab]), grid.shape))
-        squared[slab] = feet.squared(_positions(grid, slab), row[slab])
-
-    def finish(slab):
+    def measure(slab):
         values[slab] = feet.distance(_positions(grid, slab), row[slab])
 
-    def by_slabs(work, step):
-        for _ in in_order(work, progress.part(step / steps, (step + 1) / steps).each(slabs)):
-            pass
-
-    by_slabs(begin, 0)
-    changed = np.ones(grid.shape, bool)
-    for turn in range(_ROUNDS):
-        held = row.copy()
-        by_slabs(partial(_take_closest, grid, feet, row, changed, held, squared), 1 + turn)
-        changed, row = held != row, held
-    by_slabs(finish, steps - 1)
+    _by_slabs(measure, slabs, progress.part(0.9, 1.0))
     return values
 
 
-def _take_closest(grid, feet, row, changed, held, squared, slab):
-    """Where a foot of a neighbour that changed is closer than a node's own, put it into `held` and its squared distance
-    into `squared`."""
-    at, mine, best = _positions(grid, slab).reshape(3, -1), held[slab].reshape(-1), squared[slab].reshape(-1)
-    for other, fresh in zip(_neighbours(row, slab), _neighbours(changed, slab), strict=True):
-        other = other.reshape(-1)
-        tried = np.flatnonzero(fresh.reshape(-1) & (other != mine))
-        other = other[tried]
-        found = feet.squared(at.take(tried, axis=1), other)
-        closer = found < best[tried]
-        tried = tried[closer]
-        best[tried], mine[tried] = found[closer], other[closer]
+def _closest(grid, node, feet, slabs, progress):
+    """The number of a foot close to each node of the grid, int32 of its shape: that of the nearest of the nodes (s,)
+    that have one each, or one that its neighbours hold."""
+    row, number = np.empty(grid.shape, np.int32), np.full(grid.shape, -1, np.int32)
+    number.flat[node] = np.arange(len(node), dtype=np.int32)
+    progress(0.0)
+    nearest = distance_transform_edt(number < 0, return_distances=False, return_indices=True)
+
+    def look_up(slab):
+        row[slab] = number.take(np.ravel_multi_index(tuple(nearest[:, slab]), grid.shape))
+
+    _by_slabs(look_up, slabs, progress.part(0.3, 0.4))
+    del nearest, number
+    held = _Held.beyond_all(grid.shape)
+    for turn in range(_ROUNDS):
+        part = progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn)
+        _by_slabs(partial(held.measure, grid, feet, row), slabs, part.part(0.0, 0.5))
+        _by_slabs(partial(held.take_closest, np.float32(grid.spacing), row), slabs, part.part(0.5, 1.0))
+    return row
+
+
+def _by_slabs(work, slabs, progress):
+    for _ in in_order(work, progress.each(slabs)):
+        pass
+
+
+@dataclass(frozen=True)
+class _Held:
+    """The foot that each node holds, in a box with a layer more at both ends of its first axis and at the far end of
+    the others: neighbours are a fixed step away in memory, and those past the box infinitely far from their feet.
+
+    row : (nx+2,ny+1,nz+1) int32, its number     offset : (3,...) float32, from it to the node     squared : its square
+    """
+
+    row: np.ndarray
+    offset: np.ndarray
+    squared: np.ndarray
+
+    @classmethod
+    def beyond_all(cls, shape) -> "_Held":
+        box = shape[0] + 2, shape[1] + 1, shape[2] + 1
+        return cls(np.zeros(box, np.int32), np.zeros((3, *box), np.float32), np.full(box, np.inf, np.float32))
+
+    def measure(self, grid, feet, row, slab):
+        """Hold the feet that `row` has at the nodes of a slab."""
+        here = slice(slab.start + 1, slab.stop + 1), slice(-1), slice(-1)
+        offset = feet.offsets(_positions(grid, slab), row[slab])
+        self.row[here], self.offset[:, *here], self.squared[here] = row[slab], offset, dots(offset, offset)
+
+    def take_closest(self, cell, row, slab):
+        """Put into `row` the feet of neighbours that are closer to the nodes of a slab than their own. One cell h on
+        along an axis, with unit direction e, a foot at the offset o is at |o + h e|^2 = |o|^2 + 2 h o.e + h^2."""
+        offset, squared, before = self.offset.reshape(3, -1), self.squared.reshape(-1), self.row.reshape(-1)
+        layer = self.row[0].size
+        first, last = (slab.start + 1) * layer, (slab.stop + 1) * layer
+        mine, best = before[first:last].copy(), squared[first:last].copy()
+        for along, stride in zip(offset, (layer, self.row.shape[2], 1), strict=True):
+            for step in (-1, 1):
+                theirs = slice(first + step * stride, last + step * stride)
+                found = along[theirs] * (-2 * step * cell)
+                found += squared[theirs]
+                found += cell * cell
+                closer = np.flatnonzero(found < best)
+                best[closer], mine[closer] = found.take(closer), before[theirs].take(closer)
+        row[slab] = mine.reshape(-1, *self.row.shape[1:])[:, :-1, :-1]
 
 
 def _slabs(grid):
@@ -105,11 +143,3 @@ def _positions(grid, slab):
     """Positions of the nodes of a slab, (3,s,ny,nz) float32."""
     x = [(grid.origin[a] + grid.spacing * np.arange(grid.shape[a])).astype(np.float32) for a in range(3)]
     return np.stack(np.meshgrid(x[0][slab], x[1], x[2], indexing="ij"))
-
-
-def _neighbours(row, slab):
-    """What the six neighbours of the slab's nodes hold; a node at the edge of the box is its own neighbour."""
-    for axis in range(3):
-        for shift in (-1, 1):
-            index = np.clip(np.arange(row.shape[axis]) + shift, 0, row.shape[axis] - 1)
-            yield row[index[slab]] if axis == 0 else np.take(row[slab], index, axis=axis)
