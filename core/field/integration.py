@@ -69,6 +69,16 @@ def _transport(grid, node, feet, progress):
 def _closest(grid, node, feet, slabs, progress):
     """The number of a foot close to each node of the grid, int32 of its shape: that of the nearest of the nodes (s,)
     that have one each, or one that its neighbours hold."""
+    row, held = _nearest(grid, node, slabs, progress.part(0.0, 0.4)), _Held.beyond_all(grid.shape)
+    for turn in range(_ROUNDS):
+        part = progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn)
+        _by_slabs(partial(held.measure, grid, feet, row), slabs, part.part(0.0, 0.5))
+        _by_slabs(partial(held.take_closest, np.float32(grid.spacing), row), slabs, part.part(0.5, 1.0))
+    return row
+
+
+def _nearest(grid, node, slabs, progress):
+    """Which of some nodes (s,) is nearest to each node of the grid, int32 of its shape."""
     row, number = np.empty(grid.shape, np.int32), np.full(grid.shape, -1, np.int32)
     number.flat[node] = np.arange(len(node), dtype=np.int32)
     progress(0.0)
@@ -77,13 +87,7 @@ def _closest(grid, node, feet, slabs, progress):
     def look_up(slab):
         row[slab] = number.take(np.ravel_multi_index(tuple(nearest[:, slab]), grid.shape))
 
-    _by_slabs(look_up, slabs, progress.part(0.3, 0.4))
-    del nearest, number
-    held = _Held.beyond_all(grid.shape)
-    for turn in range(_ROUNDS):
-        part = progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn)
-        _by_slabs(partial(held.measure, grid, feet, row), slabs, part.part(0.0, 0.5))
-        _by_slabs(partial(held.take_closest, np.float32(grid.spacing), row), slabs, part.part(0.5, 1.0))
+    _by_slabs(look_up, slabs, progress.part(0.8, 1.0))
     return row
 
 

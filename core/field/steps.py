@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lookup import rows_of
 from .grid import CORNERS, node_strides
 
 _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point at each other
@@ -23,10 +24,7 @@ class NearBand:
 
     def rows(self, node: np.ndarray) -> np.ndarray:
         """Where nodes (m,) stand in the band, -1 for those that do not."""
-        if not len(self.node):
-            return np.full(node.shape, -1)
-        row = np.minimum(np.searchsorted(self.node, node), len(self.node) - 1)
-        return np.where(self.node[row] == node, row, -1)
+        return rows_of(node, self.node)
 
     def edges(self, axis: int, shape: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
         """Where the lower and the higher ends of the edges along `axis` of a grid of `shape` stand in the band, (e,)

@@ -13,6 +13,7 @@ be crossed twice.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..field.grid import CORNERS, Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import principal_axes
+from ..lookup import is_among, numbered
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .first_steps import first_steps
@@ -54,6 +56,7 @@ class Crossings:
         """The four cells around each edge in cyclic order, by their lowest nodes, (e,4)."""
         return _cells_around(self.node, self.axis, node_strides(grid.shape))
 
+    @cached_property
     def changing_sides(self) -> np.ndarray:
         """Edges, as 3 * node + axis, ascending, whose ends are on two sides: crossed an odd number of times."""
         edge, count = np.unique(3 * self.node + self.axis, return_counts=True)
@@ -68,7 +71,7 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     cells, corner = _whole_cells(band, grid)
     edge, vote, place = _vote(band, corner, grid, progress.part(0.4, 0.5))
     progress(0.5)
-    alone = ~np.isin(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
+    alone = ~is_among(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
     edge, vote, place = edge[alone], vote[alone], place[alone]
     step, _ = first_steps(place, band, surface, grid, progress.part(0.5, 0.9))
     progress(0.9)
@@ -81,12 +84,12 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     normal = np.concatenate([np.zeros((len(edge), 3)), meet.normal[once]])
     crossed = np.concatenate([vote > 0, meet.crossed[once]])
     certainty = np.concatenate([np.abs(vote), meet.certainty[once]])
-    whole = np.isin(_cells_around(node, axis, strides), cells).all(axis=1)
+    whole = is_among(_cells_around(node, axis, strides), cells).all(axis=1)
     node, axis, crossed, certainty = node[whole], axis[whole], crossed[whole], certainty[whole]
     progress(0.95)
     mend(node, axis, crossed, certainty, strides)
     progress(0.98)
-    twice = twice[np.isin(_cells_around(meet.node[twice], meet.axis[twice], strides), cells).all(axis=1)]
+    twice = twice[is_among(_cells_around(meet.node[twice], meet.axis[twice], strides), cells).all(axis=1)]
     return Crossings(
         np.concatenate([node[crossed], meet.node[twice]]),
         np.concatenate([axis[crossed], meet.axis[twice]]),
@@ -111,7 +114,7 @@ def _may_be_covered(band, edge, place, grid):
 def _once(meet):
     """One candidate for each edge that at most one sheet crosses, that one or the least certain; and all crossings of
     edges that several cross."""
-    edge, index = np.unique(3 * meet.node + meet.axis, return_inverse=True)
+    edge, index = numbered(3 * meet.node + meet.axis)
     several = np.bincount(index, meet.crossed, len(edge))[index] > 1
     order = np.lexsort([meet.certainty, ~meet.crossed, index])
     best = order[np.diff(index[order], prepend=-1) > 0]

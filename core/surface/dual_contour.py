@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
+from ..lookup import numbered
 from ..progress import Progress
 from .crossings import Crossings
 from .evening import evened
@@ -67,9 +68,10 @@ def _without_touches(mesh, cell):
 
 def _without_repeats(mesh):
     """The mesh without faces that pass a vertex twice or that it has already."""
-    ordered = np.sort(mesh.faces, axis=1)
-    proper = np.flatnonzero((np.diff(ordered, axis=1) > 0).all(axis=1))
-    _, first = np.unique(ordered[proper], axis=0, return_index=True)
-    kept = np.zeros(len(ordered), bool)
+    low, middle, high = np.sort(mesh.faces.astype(np.int64), axis=1).T
+    proper = np.flatnonzero((low < middle) & (middle < high))
+    edge = numbered(low[proper] * len(mesh.vertices) + middle[proper])[1]
+    _, first = np.unique(edge * len(mesh.vertices) + high[proper], return_index=True)
+    kept = np.zeros(len(low), bool)
     kept[proper[first]] = True
     return mesh.of_faces(kept)

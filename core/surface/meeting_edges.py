@@ -7,6 +7,7 @@ import numpy as np
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER
+from ..lookup import rows_of
 from ..progress import Progress
 from .meetings import meetings
 from .sheets import Sheets, one_sheet, sheets_near
@@ -53,8 +54,8 @@ def meeting_edges(node, step, surface: LocalSurface, grid: Grid, strides, hair, 
         none, nowhere = np.empty(0, np.int64), np.empty((0, 3))
         return MeetingEdges(none, none, nowhere, nowhere, np.empty(0, bool), np.empty(0), none)
     x = grid.positions(node)
-    ahead = [_rows(node, node + stride) for stride in strides]
-    back = [_rows(node, node - stride) for stride in strides]
+    ahead = [rows_of(node + stride, node) for stride in strides]
+    back = [rows_of(node - stride, node) for stride in strides]
     sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.3, 0.9))
     found = [_along(axis, ahead[axis], sheets, x, cell, hair) for axis in range(3)]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
@@ -72,12 +73,6 @@ def _at_meetings(x, surface, progress):
     for part in progress.part(0.2, 0.3).chunks(len(x) if meet.any() else 0, _CHUNK):
         found[part] = meet[surface.tree.query(x[part], workers=-1)[1]]
     return found
-
-
-def _rows(node, wanted):
-    """Rows of ascending `node` that hold the wanted ones, -1 where none does."""
-    row = np.minimum(np.searchsorted(node, wanted), len(node) - 1)
-    return np.where(node[row] == wanted, row, -1)
 
 
 def _along(axis, ahead, sheets, x, cell, hair):
@@ -111,9 +106,12 @@ def _along(axis, ahead, sheets, x, cell, hair):
 
 def _least(key, cost):
     """Whether each line has the least cost of those with its key, (e,) bool; the first of equals."""
-    order = np.lexsort([cost, key])
-    chosen = np.zeros(len(key), bool)
-    chosen[order[np.diff(key[order], prepend=-1) > 0]] = True
+    order = np.argsort(key, kind="stable")
+    ordered, chosen = cost[order], np.zeros(len(key), bool)
+    first = np.diff(key[order], prepend=-1) > 0
+    group = np.cumsum(first) - 1
+    best = np.flatnonzero(ordered == np.minimum.reduceat(ordered, np.flatnonzero(first))[group]) if len(key) else order
+    chosen[order[best[np.diff(group[best], prepend=-1) > 0]]] = True
     return chosen
 
 

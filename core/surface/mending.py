@@ -4,6 +4,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..lookup import numbered
+
 _ROUNDS = 3
 _MAJORITY = 3  # odd faces, of the four around an edge, that turn it over
 _LONGEST = 32  # odd faces of a loop that is closed
@@ -38,8 +40,7 @@ def _faces(node, axis, size, strides):
     """Distinct keys of grid faces, direction across * size + lowest node, and which four are at each edge, (e,4)."""
     sides = [(axis + 1) % 3, (axis + 2) % 3]
     faces = [across * size + node - back * strides[along] for along, across in (sides, sides[::-1]) for back in (0, 1)]
-    key, index = np.unique(np.stack(faces, axis=1), return_inverse=True)
-    return key, index.reshape(-1, 4)
+    return numbered(np.stack(faces, axis=1))
 
 
 def _apart(node, axis, strides):
@@ -83,7 +84,7 @@ def _turn(edge, faces, crossed, crossings):
 def _short_loops(key, size, strides):
     """Loops of the odd faces with keys (o,) that go from cell to cell: arrays of at most 32 indices into `key`."""
     across, node = np.divmod(key, size)
-    cell, at = np.unique(np.concatenate([node, node - strides[across]]), return_inverse=True)
+    cell, at = numbered(np.concatenate([node, node - strides[across]]))
     graph = coo_matrix((np.ones(len(key), bool), tuple(at.reshape(2, -1))), shape=(len(cell),) * 2)
     _, part = connected_components(graph, directed=False)
     part = part[at[: len(key)]]

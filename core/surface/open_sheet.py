@@ -8,6 +8,7 @@ from ..field.blocks import Blocks, at_nodes
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
+from ..lookup import numbered
 from ..progress import Progress
 from .evening import evened
 from .first_steps import first_steps
@@ -50,8 +51,9 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
     kept = np.ones(len(faces), bool)
     kept[row[off]] = ~_connected_to(found.distance[off] > _FAR * grid.spacing, faces[row[off]])
     corner, at = faces[kept].reshape(-1), np.repeat(middle[kept], faces.shape[1], axis=0)
-    share = np.bincount(corner, minlength=len(vertices))
-    rim = np.intersect1d(faces[~kept], corner)
+    share, bare = np.bincount(corner, minlength=len(vertices)), np.zeros(len(vertices), bool)
+    bare[faces[~kept]] = True
+    rim = np.flatnonzero(bare & (share > 0))
     total = np.stack([np.bincount(corner, x, len(vertices)) for x in at.T], axis=1)
     vertices = vertices.copy()
     vertices[rim] = total[rim] / share[rim, None]
@@ -61,8 +63,8 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
 def _apart(vertices, faces):
     """With a vertex for each of the sheets that have no more than it in common."""
     sheet = _connected(edge_numbers(faces, len(vertices))[0]).astype(np.int64)
-    key, corners = np.unique(faces + len(vertices) * sheet[:, None], return_inverse=True)
-    return vertices[key % len(vertices)], corners.reshape(faces.shape)
+    key, corners = numbered(faces + len(vertices) * sheet[:, None])
+    return vertices[key % len(vertices)], corners
 
 
 def _connected_to(marked, faces):

@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid, node_strides
+from ..lookup import numbered
 from .crossings import Crossings
 
 _BENT, _OFF = 0.3, 0.05  # crossings of a sheet are off each other's planes by this share of their distance, and cells
@@ -18,8 +19,7 @@ _STEEP = 0.7  # |n . n'| of sheets that meet
 def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, np.ndarray]:
     """The vertices of each crossing's quad, in cyclic order, (e,4) int; their number; and what they are, (v,) int:
     0 on a sheet alone, 1 near a meeting, 2 where sheets meet or one of several in a cell."""
-    cell, corner = np.unique(crossings.cells_around(grid), return_inverse=True)
-    corner = corner.reshape(-1)
+    cell, corner = numbered(crossings.cells_around(grid).reshape(-1))
     owner = np.repeat(np.arange(len(crossings.node)), 4)
     near = (crossings.normal != 0).any(axis=1)[owner]
     mixed = np.bincount(corner, near, len(cell)) > 0
@@ -47,8 +47,7 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
     leader = np.full(len(cell), len(corner))
     np.minimum.at(leader, corner, vertex)
     vertex = np.where(open_cell[corner], leader[corner], vertex)
-    _, vertex = np.unique(vertex, return_inverse=True)
-    vertex = vertex.reshape(-1)
+    _, vertex = numbered(vertex)
     home = np.zeros(vertex.max(initial=-1) + 1, np.int64)
     home[vertex] = corner
     several = np.bincount(home, minlength=len(cell)) > 1

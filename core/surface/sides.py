@@ -22,6 +22,7 @@ from ..field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_n
 from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..linalg import symmetric
+from ..lookup import is_among
 from ..progress import Progress
 from .crossings import Crossings
 
@@ -127,7 +128,7 @@ def _edges_of(node, near, crossings, grid):
         keys += [3 * node + axis, 3 * below[~at_nodes(near, below)] + axis]
     keys = np.concatenate(keys)
     node, axis = np.divmod(keys, 3)
-    return node, node + node_strides(grid.shape)[axis], np.isin(keys, crossings.changing_sides())
+    return node, node + node_strides(grid.shape)[axis], is_among(keys, crossings.changing_sides)
 
 
 def _sides(a, b, crossed, n, outside, progress):

@@ -16,9 +16,10 @@ def spread_signs(links: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
     graph = coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(n + 1, n + 1)).tocsr()
     visited, parent = breadth_first_order(graph, n, directed=False)
     visited, parent = visited[1:], parent[visited[1:]]
-    inner, relation = parent < n, np.ones(n)
-    relation[inner] = np.asarray(links[visited[inner], parent[inner]]).reshape(-1)
-    sign = np.ones(n + 1)
-    for row, before, same in zip(visited.tolist(), parent.tolist(), relation.tolist(), strict=True):
-        sign[row] = sign[before] * same
+    sign, above = np.ones(n + 1), np.full(n + 1, n)
+    inner = parent < n
+    sign[visited[inner]] = np.asarray(links[visited[inner], parent[inner]]).reshape(-1)
+    above[visited] = parent
+    while (above < n).any():
+        sign, above = sign * sign[above], above[above]
     return sign[:n], part

@@ -23,6 +23,7 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import symmetric
+from ..lookup import is_among, numbered
 from ..progress import Progress
 from .crossings import Crossings
 from .sides import patches
@@ -89,7 +90,7 @@ def _votes(band, crossings, grid):
     edges = [band.edges(axis, grid.shape) for axis in range(3)]
     key = np.concatenate([3 * band.node[low] + axis for axis, (low, _) in enumerate(edges)])
     low, high = np.concatenate(edges, axis=1)
-    crossed = np.isin(key, crossings.changing_sides())
+    crossed = is_among(key, crossings.changing_sides)
     past_rim = band.past_rim[low] | band.past_rim[high]
     return _Votes(low, high, np.where(crossed, -1.0, np.where(past_rim, 0.5, 1.0)))
 
@@ -107,7 +108,7 @@ def _heights(band, surface, grid):
 
 def _sides_of_nodes(votes, sure, sample, height, progress):
     """Sides of the nodes of the band, (b,) of -1 and 1, from samples oriented alike, then swept over the nodes."""
-    of, number = np.unique(sample, return_inverse=True)
+    of, number = numbered(sample)
     weight = sure.sign * height[sure.low] * height[sure.high]
     low, high = number[sure.low], number[sure.high]
     apart = low != high

@@ -126,7 +126,7 @@ def test_stops_when_told(sphere):
 def test_an_edge_crossed_twice_changes_no_side():
     node, axis = np.array([500, 500, 500, 501]), np.array([0, 0, 1, 0])
     crossings = Crossings(node, axis, np.zeros((4, 3)), np.empty(0, int), np.zeros((4, 3)))
-    assert crossings.changing_sides().tolist() == [1501, 1503]
+    assert crossings.changing_sides.tolist() == [1501, 1503]
 
 
 @pytest.mark.parametrize("name", ["sphere", "disc", "junction"])

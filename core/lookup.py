@@ -1,0 +1,23 @@
+"""Whole numbers found in others and numbered: quick where they come in runs, as nodes and edges of a grid do."""
+
+import numpy as np
+
+
+def rows_of(wanted: np.ndarray, ascending: np.ndarray) -> np.ndarray:
+    """Where numbers stand among others (n,), which ascend, of the shape of `wanted`; -1 for those that do not."""
+    if not len(ascending):
+        return np.full(wanted.shape, -1)
+    row = np.minimum(np.searchsorted(ascending, wanted), len(ascending) - 1)
+    return np.where(ascending[row] == wanted, row, -1)
+
+
+def is_among(wanted: np.ndarray, ascending: np.ndarray) -> np.ndarray:
+    """Which numbers are among others (n,), which ascend; of the shape of `wanted`, bool."""
+    return rows_of(wanted, ascending) >= 0
+
+
+def numbered(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The distinct ones of some numbers, ascending, and which of them each is, of the shape of `keys`. Asked for the
+    first of each as well, NumPy sorts by merging, which is quick on runs."""
+    distinct, _, number = np.unique(keys, return_index=True, return_inverse=True)
+    return distinct, number.reshape(keys.shape)
