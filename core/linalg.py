@@ -85,8 +85,8 @@ def lengths(a: np.ndarray) -> np.ndarray:
 
 
 def outer_sum(terms: np.ndarray) -> np.ndarray:
-    """Sums of one term for each of three axes, (m,3,w) -> (m,w,w,w)."""
-    return terms[:, 0, :, None, None] + terms[:, 1, None, :, None] + terms[:, 2, None, None, :]
+    """Sums of one term for each of three axes, (3,w,m) -> (w,w,w,m)."""
+    return terms[0][:, None, None] + terms[1][:, None] + terms[2]
 
 
 def symmetric(weight: np.ndarray, low: np.ndarray, high: np.ndarray, n: int) -> csr_matrix:

@@ -45,6 +45,12 @@ def even_chunks(count: int, most: int, progress: Progress) -> Iterator[slice]:
     return progress.chunks(count, min(max(-(-count // chunks), _FEW), most))
 
 
+def over_rows(work: Callable, count: int, most: int) -> None:
+    """Does `work` on slices of at most `most` rows that cover `count`, by all cores."""
+    for _ in in_order(work, even_chunks(count, most, Progress())):
+        pass
+
+
 def cores() -> int:
     """How many chunks are worked on at a time."""
     return min(os.cpu_count() or 1, _MOST_CORES)

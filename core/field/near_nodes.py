@@ -63,10 +63,10 @@ def _within_balls(surface, grid, radius, progress):
 def _around(shape, rim, half, width, at, normals, reach, sag):
     """Flat indices, in a box of `shape` with `rim` nodes more on every side, of the nodes within `width` cells of
     discs, of those up to `half` nodes away along each axis."""
-    node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
-    offset = node - at[:, :, None]
-    reach, sag = (each.astype(np.float32)[:, None, None, None] for each in (reach, sag))
-    height = outer_sum((normals[:, :, None] * offset).astype(np.float32))
+    home, step = np.rint(at.T).astype(np.int64), np.arange(-half, half + 1)[:, None]
+    offset = (home - at.T)[:, None] + step
+    reach, sag = reach.astype(np.float32), sag.astype(np.float32)
+    height = outer_sum((normals.T[:, None] * offset).astype(np.float32))
     lateral = outer_sum((offset**2).astype(np.float32))
     lateral -= height * height
     np.sqrt(np.maximum(lateral, 0, out=lateral), out=lateral)
@@ -74,4 +74,7 @@ def _around(shape, rim, half, width, at, normals, reach, sag):
     off *= off
     lateral = np.maximum(np.subtract(lateral, reach, out=lateral), 0, out=lateral)
     off += lateral * lateral
-    return outer_sum((node + rim) * node_strides(shape)[:, None])[off <= np.float32(width**2)]
+    strides = node_strides(shape)
+    nodes, homes = outer_sum(step * strides[:, None, None]).reshape(-1), strides @ (home + rim)
+    place, sample = np.divmod(np.flatnonzero(off <= np.float32(width**2)), len(homes))
+    return nodes.take(place) + homes.take(sample)

@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from ..parallel import in_order
+from ..parallel import in_order, over_rows
 from .evening import FLAT, vertex_normals
-from .mesh import Mesh, at_corners
+from .mesh import AT_ONCE, Mesh, at_corners
 
 
 def centred(mesh: Mesh) -> Mesh:
@@ -65,9 +65,15 @@ def bend_of(mesh: Mesh) -> Bend:
     sharp = least < FLAT
     free = ~sharp
     free[edges[counts != 2]] = False
-    place, turned = at_corners(vertices, faces), at_corners(normal, faces)
-    turn = np.stack([np.einsum("if,if->f", place[k] - place[k - 1], turned[k] - turned[k - 1]) for k in range(3)])
-    turn[:, sharp[faces].any(axis=1)] = 0.0
+    columns, turn = (np.asfortranarray(vertices), np.asfortranarray(normal)), np.empty((3, len(faces)))
+
+    def look(part):
+        place, turned = (at_corners(each, faces[part]) for each in columns)
+        for k, found in enumerate(turn):
+            found[part] = np.einsum("if,if->f", place[k] - place[k - 1], turned[k] - turned[k - 1])
+        turn[:, part] *= ~sharp[faces[part]].any(axis=1)
+
+    over_rows(look, len(faces), AT_ONCE)
     return Bend(normal, edges, sharp, free, turn)
 
 

@@ -51,7 +51,7 @@ def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Gr
     def one_sided(part):
         node, squared = _nodes_around(surface.points[part], grid, int(np.ceil(_REACH - 0.5)))
         near, inside = squared <= _REACH**2, at_nodes(values, node) < 0
-        return np.stack([~(near & side).any(axis=(1, 2, 3)) for side in (inside, ~inside)])
+        return np.stack([~(near & side).any(axis=(0, 1, 2)) for side in (inside, ~inside)])
 
     chunks = Progress.of(progress).chunks(len(surface.points), _CHUNK)
     thin, slit = np.concatenate([found for _, found in in_order(one_sided, chunks)], axis=1)
@@ -61,9 +61,8 @@ def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Gr
 
 
 def _nodes_around(points, grid, half):
-    """Flat indices of the nodes up to `half` along each axis from that nearest to each point, (n,w,w,w), nodes at the
+    """Flat indices of the nodes up to `half` along each axis from that nearest to each point, (w,w,w,n), nodes at the
     side of the box in place of those past it, and squared distances from the point to them in cells."""
-    at, last = (points - grid.origin) / grid.spacing, np.array(grid.shape) - 1
-    node = np.rint(at).astype(np.int64)[:, :, None] + np.arange(-half, half + 1)
-    node = np.clip(node, 0, last[:, None])
-    return outer_sum(node * node_strides(grid.shape)[:, None]), outer_sum((node - at[:, :, None]) ** 2)
+    at, last = ((points - grid.origin) / grid.spacing).T[:, None], np.array(grid.shape)[:, None, None] - 1
+    node = np.clip(np.rint(at).astype(np.int64) + np.arange(-half, half + 1)[:, None], 0, last)
+    return outer_sum(node * node_strides(grid.shape)[:, None, None]), outer_sum((node - at) ** 2)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ..parallel import over_rows
 from .evening import FLAT, vertex_normals
-from .mesh import Mesh, at_corners, edge_table, looked_up
+from .mesh import AT_ONCE, Mesh, at_corners, edge_table, looked_up
 
 _EVEN = 1.5  # times the other's squared length, that a diagonal may have
 _CURVED = 0.004  # of the length, by which the eightfold rise must differ
@@ -25,11 +26,16 @@ def triangles(vertices, faces):
     if faces.shape[1] == 3:
         return faces
     normal, least = vertex_normals(vertices, faces)
-    places, normals = at_corners(vertices, faces), at_corners(normal, faces)
-    (length, rise), (other_length, other_rise) = (_diagonal(places[k::2], normals[k::2]) for k in range(2))
-    told = np.maximum(length, other_length) < _EVEN * np.minimum(length, other_length)
-    told &= (np.abs(rise - other_rise) > _CURVED * np.sqrt(length)) & (least[faces] >= FLAT).all(axis=1)
-    other = np.where(told, other_rise < rise, other_length < length)
+    columns, other = (np.asfortranarray(vertices), np.asfortranarray(normal)), np.empty(len(faces), bool)
+
+    def choose(part):
+        places, normals = (at_corners(each, faces[part]) for each in columns)
+        (length, rise), (other_length, other_rise) = (_diagonal(places[k::2], normals[k::2]) for k in range(2))
+        told = np.maximum(length, other_length) < _EVEN * np.minimum(length, other_length)
+        told &= (np.abs(rise - other_rise) > _CURVED * np.sqrt(length)) & (least[faces[part]] >= FLAT).all(axis=1)
+        other[part] = np.where(told, other_rise < rise, other_length < length)
+
+    over_rows(choose, len(faces), AT_ONCE)
     clash = looked_up(edge_table(faces, len(vertices)), faces[:, :2], faces[:, 2:]) > 0
     other = np.where(clash[:, 0] != clash[:, 1], clash[:, 0], other)
     tail, head = (np.where(other, faces[:, k + 1], faces[:, k]).astype(np.int64) for k in (0, 2))
