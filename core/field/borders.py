@@ -47,7 +47,7 @@ class Rims:
     margin    : (n,3) float64, how far the sheet goes on past the sample and past those two neighbours, at rims
     reach     : (n,) float64, how far the patch covers a bridged gap
     behind    : (n,) float64, how far it covers a gap opposite to that one, at lines of samples; 0 elsewhere
-    crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ
+    crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ; any where there is none
     limit     : (n,2) float64, distance to them, inf where there is none
     """
 
@@ -90,10 +90,8 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     own, theirs = normals[part], normals[neighbours]
     step = points[neighbours] - points[part, None]
     flat = one_sheet(step, own[:, None], theirs)
-    folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
-    crease, limit = _creases(step, flat & _aligned(own[:, None], theirs, _OWN), folded, toward, line, spacing)
-    x, y = np.moveaxis(np.einsum("nki,nai->nka", np.where(folded[..., None], lateral, step), frames), 2, 0)
-    same = flat | folded
+    same, laid, crease, limit = _laid_flat(step, own, theirs, spacing, flat)
+    x, y = np.moveaxis(np.einsum("nki,nai->nka", laid, frames), 2, 0)
 
     angle = np.where(same, np.arctan2(y, x), np.inf)
     order = np.argsort(angle, axis=1)
@@ -141,6 +139,22 @@ def _level(step, normals, other_normals, step_up=_STEP):
 
 def _aligned(normals, other_normals, least):
     return np.abs(np.einsum("...i,...i->...", normals, other_normals)) > least
+
+
+def _laid_flat(step, own, theirs, spacing, flat):
+    """Which neighbours are of one sheet, those beyond folds as well, (n,k); steps to them in the sample's tangent plane
+    or, of those that are not beyond a fold, in space, (n,k,3); and the creases, see :func:`_creases`."""
+    n = len(step)
+    same, laid, crease, limit = flat.copy(), step.copy(), np.zeros((n, 2, 3)), np.full((n, 2), np.inf)
+    bent = np.flatnonzero((~flat & ~_aligned(own[:, None], theirs, _FOLD)).any(axis=1))
+    if len(bent):
+        step, own, theirs, spacing, flat = step[bent], own[bent], theirs[bent], spacing[bent], flat[bent]
+        folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
+        level = flat & _aligned(own[:, None], theirs, _OWN)
+        crease[bent], limit[bent] = _creases(step, level, folded, toward, line, spacing)
+        laid[bent] = np.where(folded[..., None], lateral, step)
+        same[bent] |= folded
+    return same, laid, crease, limit
 
 
 def _unfolded(step, normals, other_normals, spacing, candidate):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..linalg import solve_positive
+from ..linalg import dots, solve_positive
 from ..parallel import in_order
 from ..progress import Progress
 
@@ -30,46 +30,55 @@ def bending(points, normals, frames, spacing, neighbours, progress=None) -> np.n
     spacing.
     """
     bend = np.empty((len(points), 3, 3))
+    columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
 
     def fit(part):
-        return _bending(points, normals, part, frames[part], spacing[part], neighbours[part])
+        bend[part] = _bending(*columns, part, frames[part], spacing[part], neighbours[part])
 
-    for part, piece in in_order(fit, Progress.of(progress).chunks(len(points), _CHUNK)):
-        bend[part] = piece
+    for _ in in_order(fit, Progress.of(progress).chunks(len(points), _CHUNK)):
+        pass
     return bend
 
 
 def _bending(points, normals, rows, frames, spacing, neighbours):
-    own = normals[rows]
-    step = points[neighbours] - points[rows, None]
-    z = np.einsum("nki,ni->nk", step, own)
-    x, y = np.moveaxis(np.einsum("nki,nai->nka", step, frames), 2, 0)
-    agreement = np.einsum("nki,ni->nk", normals[neighbours], own)
-    tilt = np.einsum("nki,nai->nka", normals[neighbours], frames)
+    """Points and normals component by component, (3,n)."""
+    step = [column.take(neighbours) - column[rows, None] for column in points]
+    theirs = [column.take(neighbours) for column in normals]
+    own, first, second = normals[:, rows, None], *frames.transpose(1, 2, 0)[..., None]
+    z, x, y = (dots(step, axis) for axis in (own, first, second))
+    agreement = dots(theirs, own)
     counted = np.abs(agreement) > _ALIGNED
-    slope = -tilt / np.where(counted, agreement, 1.0)[..., None]
-    squared = np.einsum("nki,nki->nk", step, step)
-    height_back = np.einsum("nki,nki->nk", step, normals[neighbours])
-    apart = (z**2 + height_back**2) / squared
+    along_x, along_y = (dots(theirs, axis) / np.where(counted, -agreement, 1.0) for axis in (first, second))  # slopes
+    squared = dots(step, step)
+    apart = (z**2 + dots(step, theirs) ** 2) / squared
     decay = squared / (_WIDTH * spacing[:, None]) ** 2 + _ONE_SHEET * apart
     weight = np.where(counted, np.exp(-decay), 0.0)
 
-    zero = np.zeros_like(x)
-    distance = np.sqrt(squared)
-    equations = (
-        (np.stack([x * x, 2 * x * y, y * y], axis=2) / distance[..., None], 2 * z / distance),
-        (np.stack([x, y, zero], axis=2), slope[..., 0]),
-        (np.stack([zero, x, y], axis=2), slope[..., 1]),
+    # Of B = (xx, xy, yy): (x^2, 2 x y, y^2).B = 2 z, over the distance; (x, y, 0).B and (0, x, y).B are the slopes.
+    xx, xy, yy, nearer = x * x, x * y, y * y, weight / squared
+    by_xx, by_xy, by_yy = nearer * xx, nearer * xy, nearer * yy
+    flat = [_total(weight, term) for term in (xx, xy, yy)]
+    matrix = np.empty((len(spacing), 3, 3))
+    matrix[:, 0, 0] = _total(by_xx, xx) + flat[0]
+    matrix[:, 0, 1] = matrix[:, 1, 0] = 2 * _total(by_xx, xy) + flat[1]
+    matrix[:, 0, 2] = matrix[:, 2, 0] = _total(by_xx, yy)
+    matrix[:, 1, 1] = 4 * _total(by_xy, xy) + flat[0] + flat[2]
+    matrix[:, 1, 2] = matrix[:, 2, 1] = 2 * _total(by_yy, xy) + flat[1]
+    matrix[:, 2, 2] = _total(by_yy, yy) + flat[2]
+    matrix += _STIFFNESS * (spacing**2)[:, None, None] * np.eye(3)
+    x, y = weight * x, weight * y
+    right = (
+        2 * _total(by_xx, z) + _total(x, along_x),
+        4 * _total(by_xy, z) + _total(y, along_x) + _total(x, along_y),
+        2 * _total(by_yy, z) + _total(y, along_y),
     )
-    matrix = _STIFFNESS * (spacing**2)[:, None, None] * np.eye(3)
-    right = np.zeros((len(own), 3))
-    for row, value in equations:
-        weighted = row * weight[..., None]
-        matrix = matrix + weighted.transpose(0, 2, 1) @ row
-        right += np.einsum("nka,nk->na", weighted, value)
-    xx, xy, yy = solve_positive(matrix, right).T
+    xx, xy, yy = solve_positive(matrix, np.stack(right, axis=1)).T
 
     size = np.sqrt(xx**2 + 2 * xy**2 + yy**2)
     shrink = np.minimum(1.0, 1.0 / np.maximum(size * spacing, np.finfo(float).tiny))
     form = np.stack([np.stack([xx, xy], axis=1), np.stack([xy, yy], axis=1)], axis=1) * shrink[:, None, None]
     return np.einsum("nab,nai,nbj->nij", form, frames, frames)
+
+
+def _total(a, b):
+    return np.einsum("nk,nk->n", a, b)
