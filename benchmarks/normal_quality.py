@@ -159,7 +159,7 @@ def rounded_normals(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     """
     flat, (_, face) = face_normals(mesh), closest_faces(points, mesh)
     corner = sparse.csr_matrix((mesh.face_areas().repeat(3), (mesh.faces.ravel(), np.arange(len(flat)).repeat(3))))
-    at_vertex = principal_axes(corner @ outer(flat))[0][mesh.faces[face]]
+    at_vertex = principal_axes(corner @ outer(flat))[mesh.faces[face]]
     side = np.einsum("nki,ni->nk", at_vertex, flat[face])
     corners = np.ascontiguousarray(mesh.vertices[mesh.faces[face]].transpose(1, 0, 2))
     share = igl.barycentric_coordinates(points, *corners)

@@ -21,24 +21,16 @@ def outer(vectors: np.ndarray) -> np.ndarray:
     return products
 
 
-def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit eigenvector of the largest eigenvalue, (m,6) -> (m,3), and all eigenvalues in falling order, (m,3).
+def principal_axes(tensors: np.ndarray) -> np.ndarray:
+    """Unit eigenvectors of the largest eigenvalues of tensors (m,6), (m,3).
 
-    Trigonometric solution of the characteristic cubic (O. K. Smith, Comm. ACM 4(4), 1961). Every column of the adjugate
-    of A - lambda_1 I is along the axis; the one with the largest diagonal element is the longest. Where the two largest
-    eigenvalues coincide any axis of their plane may come back; a multiple of the identity gives any.
+    Every column of the adjugate of A - lambda_1 I is along the axis; the one with the largest diagonal element is the
+    longest. Where the two largest eigenvalues coincide any axis of their plane may come back; a multiple of the
+    identity gives any.
     """
-    xx, yy, zz, xy, xz, yz = np.ascontiguousarray(tensors.T)
-    mean = (xx + yy + zz) / 3
-    dx, dy, dz = xx - mean, yy - mean, zz - mean
-    spread = np.sqrt((dx * dx + dy * dy + dz * dz + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
-    safe = np.where(spread > 0, spread, 1.0)
-    determinant = dx * (dy * dz - yz * yz) - xy * (xy * dz - yz * xz) + xz * (xy * yz - dy * xz)
-    angle = np.arccos(np.clip(determinant / (2 * safe**3), -1, 1)) / 3
-    first = mean + 2 * spread * np.cos(angle)
-    last = mean + 2 * spread * np.cos(angle + 2 * np.pi / 3)
-    values = np.stack([first, 3 * mean - first - last, last], axis=1)
-
+    xx, yy, zz, xy, xz, yz = columns = np.ascontiguousarray(tensors.T)
+    mean, spread, angle = _roots(columns)
+    first, safe = mean + 2 * spread * np.cos(angle), np.where(spread > 0, spread, 1.0)
     ax, ay, az = (xx - first) / safe, (yy - first) / safe, (zz - first) / safe
     bxy, bxz, byz = xy / safe, xz / safe, yz / safe
     cxx, cyy, czz = ay * az - byz * byz, ax * az - bxz * bxz, ax * ay - bxy * bxy
@@ -46,12 +38,32 @@ def principal_axes(tensors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     by_x = (cxx >= cyy) & (cxx >= czz)
     by_y = cyy >= czz
     columns = (cxx, cxy, cxz), (cxy, cyy, cyz), (cxz, cyz, czz)
-    axes = np.stack([np.where(by_x, x, np.where(by_y, y, z)) for x, y, z in columns], axis=1)
-    length = np.sqrt(np.einsum("mi,mi->m", axes, axes))
-    axes /= np.maximum(length, _DISTINCT)[:, None]
+    along = [np.where(by_x, x, np.where(by_y, y, z)) for x, y, z in columns]
+    length = np.sqrt(dots(along, along))
+    axes = np.stack([each / np.maximum(length, _DISTINCT) for each in along], axis=1)
     unclear = np.flatnonzero(length <= _DISTINCT)
     axes[unclear] = _by_lapack(tensors[unclear])
-    return axes, values
+    return axes
+
+
+def eigenvalues(tensors: np.ndarray) -> np.ndarray:
+    """Eigenvalues of tensors (m,6) in falling order, (m,3)."""
+    mean, spread, angle = _roots(np.ascontiguousarray(tensors.T))
+    first, last = (mean + 2 * spread * np.cos(angle + turn) for turn in (0, 2 * np.pi / 3))
+    return np.stack([first, 3 * mean - first - last, last], axis=1)
+
+
+def _roots(columns):
+    """Mean, spread and angle, (m,) each, of the eigenvalues ``mean + 2 spread cos(angle + 2 pi k / 3)`` of tensors, six
+    (m,): the trigonometric solution of the characteristic cubic (O. K. Smith, Comm. ACM 4(4), 1961)."""
+    xx, yy, zz, xy, xz, yz = columns
+    mean = (xx + yy + zz) / 3
+    dx, dy, dz = xx - mean, yy - mean, zz - mean
+    spread = np.sqrt((dx * dx + dy * dy + dz * dz + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
+    determinant = dx * (dy * dz - yz * yz) - xy * (xy * dz - yz * xz) + xz * (xy * yz - dy * xz)
+    cubed = spread * spread * spread  # NumPy's powers but squares take many times as long
+    cosine = determinant / (2 * np.where(cubed > 0, cubed, 1.0))
+    return mean, spread, np.arccos(np.clip(cosine, -1, 1)) / 3
 
 
 def solve_positive(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:

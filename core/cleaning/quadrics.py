@@ -112,7 +112,7 @@ def _least_spread(offset, share):
     weighted = [share * part for part in offset]
     mean = [np.einsum("mk->m", part) for part in weighted]
     spread = [np.einsum("mk,mk->m", weighted[a], offset[b]) - mean[a] * mean[b] for a, b in COMPONENTS]
-    return principal_axes(-np.stack(spread, axis=1))[0]
+    return principal_axes(-np.stack(spread, axis=1))
 
 
 def _weighted_fit(basis, weight, height):

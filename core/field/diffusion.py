@@ -38,6 +38,6 @@ def fused_axes(weight, pull, normals) -> np.ndarray:
     """
     weighted = weight * normals
     tensor = [np.einsum("mk,mk->m", weighted[a], normals[b]) for a, b in COMPONENTS]
-    axes, _ = principal_axes(np.stack(tensor, axis=1).astype(np.float64))
+    axes = principal_axes(np.stack(tensor, axis=1).astype(np.float64))
     direction = np.einsum("imk,mk->mi", weighted, pull)
     return axes * np.where(np.einsum("mi,mi->m", axes, direction) < 0, -1.0, 1.0)[:, None]

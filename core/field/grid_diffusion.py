@@ -68,7 +68,7 @@ def grid_axes(points, normals, spacing, grid: Grid, stride: int = 1, progress=No
 
 def _fused(components):
     """The principal axis of the tensors (m,6) that stand first, signed by the vectors (m,3) that follow."""
-    axes, _ = principal_axes(components[:, :6])
+    axes = principal_axes(components[:, :6])
     return axes * np.where(np.einsum("mi,mi->m", axes, components[:, 6:]) < 0, -1.0, 1.0)[:, None]
 
 

@@ -75,7 +75,7 @@ class Mirrors:
 
     def plane_fit(self) -> np.ndarray:
         """(n,3) axes most perpendicular to the directions of the neighbours: a start that needs no axes."""
-        return principal_axes(-self.alignment)[0]
+        return principal_axes(-self.alignment)
 
     def images(self, normals: np.ndarray) -> np.ndarray:
         """(3,p) mirror images of each neighbour's axis in the bisector plane."""

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import outer, principal_axes
+from ..linalg import eigenvalues, outer, principal_axes
 
 NEIGHBOURS = 10
 
@@ -14,6 +14,6 @@ def pca_normals(points: np.ndarray, neighbours: int = NEIGHBOURS) -> tuple[np.nd
     k = min(neighbours, len(points) - 1)
     group = points[KDTree(points).query(points, k=k + 1, workers=-1)[1]]
     group = group - group.mean(axis=1, keepdims=True)
-    axes, values = principal_axes(-outer(group).mean(axis=1))
-    least, middle = -values[:, 0], -values[:, 1]
-    return axes, np.clip(1 - least / np.maximum(middle, np.finfo(float).tiny), 0.0, 1.0)
+    tensors = -outer(group).mean(axis=1)
+    least, middle, _ = -eigenvalues(tensors).T
+    return principal_axes(tensors), np.clip(1 - least / np.maximum(middle, np.finfo(float).tiny), 0.0, 1.0)

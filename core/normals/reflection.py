@@ -65,4 +65,4 @@ def sweep_once(mirrors: Mirrors, normals: np.ndarray, sweep: int, rows=slice(Non
     """The axes (n,3) after a sweep, counted from 1; of some `rows` (n,) bool alone where given."""
     inertia = _INERTIA if sweep > _FREE_SWEEPS else 0.0
     tensors = mirrors.agreement(normals) - mirrors.alignment + inertia * outer(normals)
-    return principal_axes(tensors[rows])[0]
+    return principal_axes(tensors[rows])

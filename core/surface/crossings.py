@@ -166,5 +166,5 @@ def _sides(step):
     is the cell's own."""
     slope = np.einsum("cki,kj->cij", step, CORNERS - 0.5)
     slope = slope + slope.transpose(0, 2, 1)
-    normal, _ = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    normal = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     return np.einsum("cki,ci->ck", step, normal)

@@ -112,7 +112,7 @@ def _axes(mesh):
     corner = mesh.faces.reshape(-1)
     products = [np.repeat(normal[:, i] * normal[:, j], 3) for i, j in COMPONENTS]
     tensors = [np.bincount(corner, product, len(mesh.vertices)) for product in products]
-    return principal_axes(np.stack(tensors, axis=1))[0]
+    return principal_axes(np.stack(tensors, axis=1))
 
 
 def _neighbours(border, loop):
