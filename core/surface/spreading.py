@@ -20,6 +20,6 @@ def spread_signs(links: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
     inner = parent < n
     sign[visited[inner]] = np.asarray(links[visited[inner], parent[inner]]).reshape(-1)
     above[visited] = parent
-    while (above < n).any():
+    while (above < n).any():  # each looks twice as far up as before
         sign, above = sign * sign[above], above[above]
     return sign[:n], part

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.parallel import _FEW, _HELD, even_chunks, in_order
+from core.parallel import _FEW, _HELD, even_chunks, in_order, over_rows
 from core.progress import Progress
 
 CORES = os.cpu_count() or 1
@@ -17,6 +17,17 @@ pytestmark = pytest.mark.skipif(CORES < 2, reason="one core works on chunks one 
 def test_results_come_in_the_order_of_the_chunks():
     assert list(in_order(lambda x: x * x, range(100))) == [(x, x * x) for x in range(100)]
     assert list(in_order(str, [])) == []
+
+
+@pytest.mark.parametrize("count", [0, 1, _FEW, 10 * _FEW + 7])
+def test_every_row_is_worked_on_once(count):
+    times = np.zeros(count, int)
+
+    def work(part):
+        times[part] += 1
+
+    over_rows(work, count, 2 * _FEW)
+    assert (times == 1).all()
 
 
 def test_chunks_behind_a_large_one_go_on_meanwhile_but_not_without_end():

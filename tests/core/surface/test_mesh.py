@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core import Mesh
-from core.surface.mesh import edge_numbers, edges_of, in_use
+from core.surface.mesh import edge_numbers, edge_table, edges_of, in_use, looked_up
 
 TETRAHEDRON = Mesh(
     np.concatenate([np.zeros((1, 3)), np.eye(3)]),
@@ -94,3 +94,17 @@ def test_vertices_out_of_use_are_left_out():
     vertices, faces = in_use(np.arange(24.0).reshape(8, 3), np.array([[7, 1, 3], [3, 1, 4]]))
     np.testing.assert_array_equal(vertices[:, 0], [3, 9, 12, 21])
     np.testing.assert_array_equal(faces, [[3, 0, 1], [1, 0, 2]])
+
+
+@pytest.mark.parametrize("corners", [3, 4])
+def test_edges_are_counted_as_their_sorted_numbers_are(corners, random):
+    faces = np.array([random.permutation(12)[:corners] for _ in range(20)])
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    expected, times = np.unique(ends, axis=0, return_counts=True)
+    (low, high), counts = edges_of(faces, 12)
+    np.testing.assert_array_equal(np.stack([low, high], axis=1), expected)
+    np.testing.assert_array_equal(counts, times)
+    every = np.indices((12, 12)).reshape(2, -1)
+    known = {tuple(end): time for end, time in zip(expected.tolist(), times.tolist(), strict=True)}
+    held = looked_up(edge_table(faces, 12), *every)
+    assert held.tolist() == [known.get((min(a, b), max(a, b)), 0) for a, b in every.T.tolist()]

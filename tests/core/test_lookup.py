@@ -1,0 +1,34 @@
+"""Against NumPy's own sets of numbers."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from core.lookup import is_among, numbered, rows_of
+
+NUMBERS = arrays(np.int64, st.integers(0, 30), elements=st.integers(-5, 20))
+
+
+@given(NUMBERS, NUMBERS)
+def test_rows_are_where_the_numbers_stand(wanted, others):
+    ascending = np.unique(others)
+    row = rows_of(wanted, ascending)
+    assert (row >= 0).tolist() == is_among(wanted, ascending).tolist() == np.isin(wanted, ascending).tolist()
+    assert ascending[row[row >= 0]].tolist() == wanted[row >= 0].tolist()
+
+
+@pytest.mark.parametrize("shape", [(0,), (7,), (3, 4), (0, 2)])
+def test_answers_have_the_shape_of_the_question(shape, random):
+    wanted, ascending = random.integers(0, 9, shape), np.array([1, 4, 5])
+    assert rows_of(wanted, ascending).shape == is_among(wanted, ascending).shape == shape
+    assert (rows_of(wanted, ascending[:0]) == -1).all()
+    assert numbered(wanted)[1].shape == shape
+
+
+@given(NUMBERS)
+def test_distinct_numbers_in_order_and_which_each_is(keys):
+    distinct, number = numbered(keys)
+    assert distinct.tolist() == sorted(set(keys.tolist()))
+    assert distinct[number].tolist() == keys.tolist()
