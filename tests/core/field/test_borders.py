@@ -40,6 +40,17 @@ def test_a_closed_surface_has_none(points):
     assert not rims.gap.any()
 
 
+def test_beside_an_edge_neighbours_beyond_it_fill_the_gap():
+    points = shapes.cube(2400)
+    side = np.abs(points).argmax(axis=1)
+    rims, spacing = rims_of(points, np.eye(3)[side])
+    beside = np.sort(np.abs(points), axis=1)[:, 1] > 1 - 0.6 * np.median(spacing)
+    assert rims.gap[beside].mean() < 0.03
+    assert np.isfinite(rims.limit[beside, 0]).all()
+    assert not rims.gap[~beside].any()
+    np.testing.assert_allclose(np.einsum("ni,ni->n", rims.crease[beside, 0], np.eye(3)[side[beside]]), 0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("bridge", "crossed"), [(1.5, False), (3.0, False), (6.0, True), (20.0, True)])
 def test_a_hole_is_bridged_when_narrower_than_asked(bridge, crossed):
     points = shapes.holed_square(1000, radius=0.15)

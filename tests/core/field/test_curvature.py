@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from core.field.curvature import bending, tangent_frames
+from core.field.curvature import _ALIGNED, _ONE_SHEET, _STIFFNESS, _WIDTH, bending, tangent_frames
 from core.field.local_surface import patch_neighbours
 from core.points import local_spacing
 from tests import shapes
@@ -81,3 +81,30 @@ def test_is_never_tighter_than_the_spacing(seed):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     form, spacing = forms(points, normals)
     assert (np.linalg.norm(form, axis=(1, 2)) * spacing).max() < 1 + 1e-9
+
+
+def test_forms_solve_the_weighted_equations(random):
+    """Against NumPy's least squares on the equations as they are written, for rough samples and tilted normals."""
+    points = random.uniform(-1, 1, (60, 3)) * [1, 1, 0.2]
+    normals = random.normal(size=(60, 3)) * 0.3 + [0, 0, 1]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    spacing, frames = random.uniform(0.2, 0.4, 60), tangent_frames(normals)
+    neighbours = patch_neighbours(KDTree(points))
+    form = bending(points, normals, frames, spacing, neighbours)
+    for i, others in enumerate(neighbours):
+        rows, values = [np.sqrt(_STIFFNESS) * spacing[i] * np.eye(3)], [np.zeros(3)]
+        for j in others:
+            step, agreement = points[j] - points[i], normals[i] @ normals[j]
+            if abs(agreement) <= _ALIGNED:
+                continue
+            x, y = frames[i] @ step
+            z, back, length = step @ normals[i], step @ normals[j], np.linalg.norm(step)
+            decay = (length / (_WIDTH * spacing[i])) ** 2 + _ONE_SHEET * (z**2 + back**2) / length**2
+            slope = -(frames[i] @ normals[j]) / agreement
+            weight = np.exp(-decay / 2)
+            rows.append(weight * np.array([[x * x / length, 2 * x * y / length, y * y / length], [x, y, 0], [0, x, y]]))
+            values.append(weight * np.array([2 * z / length, *slope]))
+        xx, xy, yy = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
+        expected = np.array([[xx, xy], [xy, yy]])
+        expected *= min(1.0, 1 / (np.linalg.norm(expected) * spacing[i]))
+        np.testing.assert_allclose(form[i], frames[i].T @ expected @ frames[i], atol=1e-6)

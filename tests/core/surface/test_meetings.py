@@ -5,6 +5,7 @@ import pytest
 
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.surface.meeting_edges import _least
 from core.surface.meetings import meetings
 from core.surface.sheets import sheets_near
 from tests import shapes
@@ -84,3 +85,13 @@ def test_a_sheet_is_told_to_the_neighbour_that_does_not_know_it():
     told = sheets_near(surface, x, [np.array([1, -1])] + [nobody] * 5, cell)
     assert np.bincount(told.node).tolist() == [2, 2]
     assert np.sort(np.abs(told.tau[told.node == 1])) == pytest.approx([0.02, 0.03], abs=2e-3)
+
+
+def test_of_lines_of_one_edge_the_first_of_least_cost_is_chosen(random):
+    key, cost = random.integers(0, 20, 300), random.integers(0, 4, 300) / 4
+    best = {}
+    for row, each in enumerate(key.tolist()):
+        if each not in best or cost[row] < cost[best[each]]:
+            best[each] = row
+    assert np.flatnonzero(_least(key, cost)).tolist() == sorted(best.values())
+    assert _least(key[:0], cost[:0]).shape == (0,)
