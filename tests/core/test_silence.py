@@ -41,7 +41,7 @@ def looks_and_results(stage):
     [
         ("spacing", core_points, "_CHUNK", CHUNK),
         ("outliers", outliers, "_CHUNK", CHUNK),
-        ("denoising", quadrics, "_CHUNK", 12 * CHUNK),
+        ("denoising", quadrics, "_QUERIED", 12 * CHUNK),
         ("patches", local_surface, "_CHUNK", CHUNK),
         ("patches", curvature, "_CHUNK", CHUNK),
         ("patches", borders, "_CHUNK", CHUNK),
