@@ -91,6 +91,11 @@ def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def row_dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Inner products of the rows of arrays (m,k), (m,)."""
+    return np.einsum("mk,mk->m", a, b)
+
+
 def lengths(a: np.ndarray) -> np.ndarray:
     """(m,) of vectors stored component by component, (3,m)."""
     return np.sqrt(np.einsum("im,im->m", a, a))

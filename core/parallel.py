@@ -38,6 +38,12 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
+def work_through(work: Callable, chunks: Iterable) -> None:
+    """Does `work` on all chunks as :func:`in_order` does, where it puts what it finds in place itself."""
+    for _ in in_order(work, chunks):
+        pass
+
+
 def even_chunks(count: int, most: int, progress: Progress) -> Iterator[slice]:
     """Slices of at most `most` rows that cover `count` in order, so many that no core waits for others at the end; with
     a report before each, see :meth:`Progress.chunks`."""
@@ -47,8 +53,7 @@ def even_chunks(count: int, most: int, progress: Progress) -> Iterator[slice]:
 
 def over_rows(work: Callable, count: int, most: int) -> None:
     """Does `work` on slices of at most `most` rows that cover `count`, by all cores."""
-    for _ in in_order(work, even_chunks(count, most, Progress())):
-        pass
+    work_through(work, even_chunks(count, most, Progress()))
 
 
 def cores() -> int:

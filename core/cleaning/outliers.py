@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree
 
-from ..parallel import even_chunks, in_order
+from ..parallel import even_chunks, work_through
 from ..points import SPACING_NEIGHBOURS, finite_points
 from ..progress import Progress
 from .quadrics import fit_quadrics
@@ -110,8 +110,7 @@ class _Surroundings:
             curve[part] = extent[:, 1] < _CURVE * size
             off_plane[part] = np.abs(np.einsum("ni,ni->n", points[part] - centre, axes[:, :, 0]))
 
-        for _ in in_order(look, even_chunks(n, _CHUNK, progress.part(0.0, 0.9))):
-            pass
+        work_through(look, even_chunks(n, _CHUNK, progress.part(0.0, 0.9)))
         for part in progress.part(0.9, 1.0).chunks(n, _CHUNK):
             theirs[part] = np.median(self.spacing[self.neighbours[part, 1:]], axis=1)
         theirs = np.maximum(theirs, np.finfo(float).tiny)

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..field.curvature import tangent_frames
-from ..linalg import COMPONENTS, dots, principal_axes, solve_positive
-from ..parallel import even_chunks, in_order
+from ..linalg import COMPONENTS, dots, principal_axes, row_dots, solve_positive
+from ..parallel import even_chunks, work_through
 from ..progress import Progress
 
 GAUSS = 1.4826  # standard deviations in a median absolute error
@@ -77,8 +77,7 @@ def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
                 at = slice(part.start + first, min(part.start + first + step, part.stop))
                 quadrics.step[at], quadrics.height[at], quadrics.leverage[at], quadrics.radius[at] = piece
 
-    for _ in in_order(fit, even_chunks(len(rows), max(1, _QUERIED // most), Progress.of(progress))):
-        pass
+    work_through(fit, even_chunks(len(rows), max(1, _QUERIED // most), Progress.of(progress)))
     return found
 
 
@@ -124,11 +123,7 @@ def _weighted_fit(basis, weight, height):
     weighted = [share, *(share * term for term in basis)]
     by_xx, by_xy, by_yy = weighted[3:]
     moments = [np.einsum("mk->m", term) for term in weighted]
-    moments += [_total(by_xx, x), _total(by_xx, y), _total(by_yy, x), _total(by_yy, y)]
-    moments += [_total(by_xx, xx), _total(by_xx, xy), _total(by_xx, yy), _total(by_xy, yy), _total(by_yy, yy)]
+    moments += [row_dots(by_xx, x), row_dots(by_xx, y), row_dots(by_yy, x), row_dots(by_yy, y)]
+    moments += [row_dots(by_xx, xx), row_dots(by_xx, xy), row_dots(by_xx, yy), row_dots(by_xy, yy), row_dots(by_yy, yy)]
     matrix = np.stack(moments, axis=1)[:, _MOMENTS] + _STIFFNESS * np.eye(COEFFICIENTS)
-    return solve_positive(matrix, np.stack([_total(each, height) for each in weighted], axis=1)), matrix, full
-
-
-def _total(a, b):
-    return np.einsum("mk,mk->m", a, b)
+    return solve_positive(matrix, np.stack([row_dots(each, height) for each in weighted], axis=1)), matrix, full

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..linalg import dots, solve_positive
-from ..parallel import in_order
+from ..linalg import dots, row_dots, solve_positive
+from ..parallel import work_through
 from ..progress import Progress
 
 _WIDTH = 1.5  # of the Gaussian weight, local spacings
@@ -35,8 +35,7 @@ def bending(points, normals, frames, spacing, neighbours, progress=None) -> np.n
     def fit(part):
         bend[part] = _bending(*columns, part, frames[part], spacing[part], neighbours[part])
 
-    for _ in in_order(fit, Progress.of(progress).chunks(len(points), _CHUNK)):
-        pass
+    work_through(fit, Progress.of(progress).chunks(len(points), _CHUNK))
     return bend
 
 
@@ -57,20 +56,20 @@ def _bending(points, normals, rows, frames, spacing, neighbours):
     # Of B = (xx, xy, yy): (x^2, 2 x y, y^2).B = 2 z, over the distance; (x, y, 0).B and (0, x, y).B are the slopes.
     xx, xy, yy, nearer = x * x, x * y, y * y, weight / squared
     by_xx, by_xy, by_yy = nearer * xx, nearer * xy, nearer * yy
-    flat = [_total(weight, term) for term in (xx, xy, yy)]
+    flat = [row_dots(weight, term) for term in (xx, xy, yy)]
     matrix = np.empty((len(spacing), 3, 3))
-    matrix[:, 0, 0] = _total(by_xx, xx) + flat[0]
-    matrix[:, 0, 1] = matrix[:, 1, 0] = 2 * _total(by_xx, xy) + flat[1]
-    matrix[:, 0, 2] = matrix[:, 2, 0] = _total(by_xx, yy)
-    matrix[:, 1, 1] = 4 * _total(by_xy, xy) + flat[0] + flat[2]
-    matrix[:, 1, 2] = matrix[:, 2, 1] = 2 * _total(by_yy, xy) + flat[1]
-    matrix[:, 2, 2] = _total(by_yy, yy) + flat[2]
+    matrix[:, 0, 0] = row_dots(by_xx, xx) + flat[0]
+    matrix[:, 0, 1] = matrix[:, 1, 0] = 2 * row_dots(by_xx, xy) + flat[1]
+    matrix[:, 0, 2] = matrix[:, 2, 0] = row_dots(by_xx, yy)
+    matrix[:, 1, 1] = 4 * row_dots(by_xy, xy) + flat[0] + flat[2]
+    matrix[:, 1, 2] = matrix[:, 2, 1] = 2 * row_dots(by_yy, xy) + flat[1]
+    matrix[:, 2, 2] = row_dots(by_yy, yy) + flat[2]
     matrix += _STIFFNESS * (spacing**2)[:, None, None] * np.eye(3)
     x, y = weight * x, weight * y
     right = (
-        2 * _total(by_xx, z) + _total(x, along_x),
-        4 * _total(by_xy, z) + _total(y, along_x) + _total(x, along_y),
-        2 * _total(by_yy, z) + _total(y, along_y),
+        2 * row_dots(by_xx, z) + row_dots(x, along_x),
+        4 * row_dots(by_xy, z) + row_dots(y, along_x) + row_dots(x, along_y),
+        2 * row_dots(by_yy, z) + row_dots(y, along_y),
     )
     xx, xy, yy = solve_positive(matrix, np.stack(right, axis=1)).T
 
@@ -78,7 +77,3 @@ def _bending(points, normals, rows, frames, spacing, neighbours):
     shrink = np.minimum(1.0, 1.0 / np.maximum(size * spacing, np.finfo(float).tiny))
     form = np.stack([np.stack([xx, xy], axis=1), np.stack([xy, yy], axis=1)], axis=1) * shrink[:, None, None]
     return np.einsum("nab,nai,nbj->nij", form, frames, frames)
-
-
-def _total(a, b):
-    return np.einsum("nk,nk->n", a, b)

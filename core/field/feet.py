@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import dots
 from .grid import Grid
 from .local_surface import LocalSurface, Projection
 from .projection import FROM_NODES
@@ -33,19 +34,15 @@ class Feet:
     def tree(self) -> KDTree:
         return KDTree(self.centres.T, balanced_tree=False, compact_nodes=False)
 
-    def offsets(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
-        """To x (3,...) float32 from the feet number `row` (...), (3,...)."""
-        return np.stack([x_a - centre.take(row) for x_a, centre in zip(x, self.centres, strict=True)])
+    def offsets(self, x: np.ndarray, row: np.ndarray) -> list[np.ndarray]:
+        """To x (3,...) float32 from the feet number `row` (...), three (...)."""
+        return [x_a - centre.take(row) for x_a, centre in zip(x, self.centres, strict=True)]
 
     def distance(self, x: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Distances from x (3,...) float32 to the discs number `row` (...)."""
-        height, squared = 0.0, 0.0
-        for x_a, centre, normal in zip(x, self.centres, self.normals, strict=True):
-            offset = x_a - centre.take(row)
-            height = height + offset * normal.take(row)
-            squared = squared + offset * offset
-        height *= height
-        lateral = np.sqrt(np.maximum(squared - height, 0)) - self.radius.take(row)
+        offset = self.offsets(x, row)
+        height = dots(offset, [normal.take(row) for normal in self.normals]) ** 2
+        lateral = np.sqrt(np.maximum(dots(offset, offset) - height, 0)) - self.radius.take(row)
         return np.sqrt(height + np.maximum(lateral, 0) ** 2)
 
     def distances(self, x: np.ndarray) -> np.ndarray:

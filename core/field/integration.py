@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from ..linalg import dots
-from ..parallel import in_order
+from ..parallel import work_through
 from ..progress import Progress
 from .feet import no_farther_than_feet, settled_feet
 from .grid import Grid
@@ -62,7 +62,7 @@ def _transport(grid, node, feet, progress):
     def measure(slab):
         values[slab] = feet.distance(_positions(grid, slab), row[slab])
 
-    _by_slabs(measure, slabs, progress.part(0.9, 1.0))
+    work_through(measure, progress.part(0.9, 1.0).each(slabs))
     return values
 
 
@@ -72,8 +72,9 @@ def _closest(grid, node, feet, slabs, progress):
     row, held = _nearest(grid, node, slabs, progress.part(0.0, 0.4)), _Held.beyond_all(grid.shape)
     for turn in range(_ROUNDS):
         part = progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn)
-        _by_slabs(partial(held.measure, grid, feet, row), slabs, part.part(0.0, 0.5))
-        _by_slabs(partial(held.take_closest, np.float32(grid.spacing), row), slabs, part.part(0.5, 1.0))
+        work_through(partial(held.measure, grid, feet, row), part.part(0.0, 0.5).each(slabs))
+        closer = partial(held.take_closest, np.float32(grid.spacing), row)
+        work_through(closer, part.part(0.5, 1.0).each(slabs))
     return row
 
 
@@ -87,13 +88,8 @@ def _nearest(grid, node, slabs, progress):
     def look_up(slab):
         row[slab] = number.take(np.ravel_multi_index(tuple(nearest[:, slab]), grid.shape))
 
-    _by_slabs(look_up, slabs, progress.part(0.8, 1.0))
+    work_through(look_up, progress.part(0.8, 1.0).each(slabs))
     return row
-
-
-def _by_slabs(work, slabs, progress):
-    for _ in in_order(work, progress.each(slabs)):
-        pass
 
 
 @dataclass(frozen=True)

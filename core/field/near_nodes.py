@@ -4,7 +4,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from ..linalg import outer_sum
-from ..parallel import in_order
+from ..parallel import work_through
 from ..progress import Progress
 from .borders import DISC
 from .grid import Grid, node_strides
@@ -45,8 +45,7 @@ def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -
         half, rows = piece
         found.flat[_around(found.shape, rim, half, width + _MARGIN, *(each[rows] for each in patches))] = True
 
-    for _ in in_order(mark, progress.each(pieces)):
-        pass
+    work_through(mark, progress.each(pieces))
     return np.flatnonzero(found[rim:-rim, rim:-rim, rim:-rim])
 
 

@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..field.local_surface import LocalSurface
+from ..lookup import rows_of
 from .fillings import edge_keys, face_keys, fillings
 from .mesh import Mesh
 
@@ -91,8 +92,8 @@ def _doubled(mesh, border, loops):
     for number, loop in enumerate(loops):
         tail, head = mesh.vertices[loop], mesh.vertices[np.roll(loop, -1)]
         wanted = edge_keys(np.stack([loop, np.roll(loop, -1)], axis=1), n)
-        row = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
-        length = np.linalg.norm(head - tail, axis=1) * (key[row] == wanted)
+        row = rows_of(wanted, key)
+        length = np.linalg.norm(head - tail, axis=1) * (row >= 0)
         axis = _unit(np.cross(tail - tail[0], head - tail[0]).sum(axis=0))
         share[number] = length @ _unit(np.cross(head - tail, beyond[row] - tail)) @ axis / max(length.sum(), _TINY)
     return share

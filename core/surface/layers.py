@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from ..field.grid import node_strides
 from ..linalg import cross, dots, lengths
-from ..parallel import in_order
+from ..parallel import work_through
 from ..progress import Progress
 from .centring import Bend, bend_of
 from .mesh import Mesh, at_corners
@@ -82,8 +82,7 @@ def _other_layer(mesh, place, outward, cell, progress):
         which[part] = near[face[nearest]]
         behind[part] = np.where(hit[nearest], depth[nearest], np.inf)
 
-    for _ in in_order(look, progress.chunks(len(place), _CHUNK)):
-        pass
+    work_through(look, progress.chunks(len(place), _CHUNK))
     return behind, which
 
 

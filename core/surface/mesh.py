@@ -104,7 +104,7 @@ def edges_of(faces: np.ndarray, n: int) -> tuple[tuple[np.ndarray, np.ndarray], 
 
 def edge_table(faces: np.ndarray, n: int) -> csr_matrix:
     """How many faces each edge of triangles or quads (f,k) over n vertices has, (n,n) sparse, at its lower end and its
-    higher one. Entries are in order; counting them so is some times as quick as sorting numbers of edges."""
+    higher one. Entries are in order; counting them so is several times as quick as sorting numbers of edges."""
     tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     ends = np.minimum(tail, head), np.maximum(tail, head)
     return coo_matrix((np.ones(len(tail), np.int32), ends), shape=(n, n)).tocsr()

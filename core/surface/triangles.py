@@ -4,6 +4,7 @@ import numpy as np
 
 from ..parallel import over_rows
 from .evening import FLAT, vertex_normals
+from .fillings import edge_keys
 from .mesh import AT_ONCE, Mesh, at_corners, edge_table, looked_up
 
 _EVEN = 1.5  # times the other's squared length, that a diagonal may have
@@ -38,8 +39,7 @@ def triangles(vertices, faces):
     over_rows(choose, len(faces), AT_ONCE)
     clash = looked_up(edge_table(faces, len(vertices)), faces[:, :2], faces[:, 2:]) > 0
     other = np.where(clash[:, 0] != clash[:, 1], clash[:, 0], other)
-    tail, head = (np.where(other, faces[:, k + 1], faces[:, k]).astype(np.int64) for k in (0, 2))
-    chosen = np.minimum(tail, head) * len(vertices) + np.maximum(tail, head)
+    chosen = edge_keys(np.where(other[:, None], faces[:, 1::2], faces[:, ::2]), len(vertices))
     _, first, count = np.unique(chosen, return_index=True, return_counts=True)
     repeated = np.setdiff1d(np.flatnonzero(np.isin(chosen, chosen[first[count > 1]])), first)
     other[repeated] = ~other[repeated]

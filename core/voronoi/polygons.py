@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lookup import rows_of
 from .facets import Facets, by_blocks, clip_radius, dot, facets_of, inside_ball, joined
 
 _ARC_STEP = 0.25  # radians; longest chord that stands for a piece of the clip circle
@@ -106,8 +107,8 @@ def _parts_inside(sides, facets, frame, n):
     for a facet that holds the whole disc, one point of its circle."""
     enter, leave = inside_ball(sides)
     keys, key = facets.pairs @ [n, 1], sides.i * n + sides.j
-    facet = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
-    kept = np.flatnonzero((leave > enter) & (keys[facet] == key))
+    facet = rows_of(key, keys)
+    kept = np.flatnonzero((leave > enter) & (facet >= 0))
     facet, tail, step = facet[kept], sides.tail[kept], sides.head[kept] - sides.tail[kept]
     enter, leave = enter[kept, None], leave[kept, None]
     head, leaves, tail = tail + leave * step, leave[:, 0] < 1, tail + enter * step
