@@ -25,7 +25,6 @@ from ..core.surface.extract import extract_surfaces
 from . import stored_field
 
 CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
-_NO_STEPS = NearBand(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, bool))  # volumes hold distances alone
 
 
 @dataclass(frozen=True)
@@ -236,7 +235,8 @@ def _extracted(task, folder, progress):
     values = stored_field.distances(task.volume, grid.shape) / np.float32(samples.scale)
     part = progress.part(0.0, 0.4, "surface")
     local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)
-    found = extract_surfaces(values, _NO_STEPS, local, grid, settings, lambda x: x, progress.part(0.4, 0.9))
+    no_steps = NearBand.without_nodes(grid.shape)  # volumes hold distances alone
+    found = extract_surfaces(values, no_steps, local, grid, settings, lambda x: x, progress.part(0.4, 0.9))
     skin = None
     if mesh := found.meshes.get("double"):
         off = np.linalg.norm(local.project(mesh.vertices, progress.part(0.9, 1.0)).step, axis=1) * samples.scale

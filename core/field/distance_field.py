@@ -28,7 +28,7 @@ class _OnGrid:
         inside = np.clip(cells, 0, np.array(self.shape) - 1)
         found = self._inside(inside)
         if self.near is not None and not self.sdf:
-            row, step = self.near.between(inside, self.shape, self.spacing)
+            row, step = self.near.between(inside, self.spacing)
             found[row] = np.sqrt(np.einsum("mi,mi->m", step, step))
         return found + self.spacing * np.linalg.norm(cells - inside, axis=1)
 

@@ -51,7 +51,7 @@ def distance_field(
         held, feet = settled_feet(surface, grid, node, near, progress.part(0.6, 0.8))
         values = _transport(grid, held, feet, progress.part(0.8, 1.0))
         values.flat[node] = no_farther_than_feet(near.distance, values.flat[node], grid)
-    return values, NearBand(node, near.step, near.past_rim)
+    return values, NearBand(grid.shape, node, near.step, near.past_rim, near.sample)
 
 
 def _transport(grid, node, feet, progress):

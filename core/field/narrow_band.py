@@ -40,7 +40,7 @@ def banded_field(surface: LocalSurface, grid: Grid, width: float, progress=None)
     feet = _feet(surface, grid, node, near, progress.part(0.6, 0.75))
     values = _around(surface, grid, width, corner, sample, feet, progress.part(0.75, 1.0))
     values.put(node, no_farther_than_feet(near.distance, values.at(node), grid))
-    return values.merged(), NearBand(node, near.step, near.past_rim), feet
+    return values.merged(), NearBand(grid.shape, node, near.step, near.past_rim, near.sample), feet
 
 
 def trimmed(values: Blocks, band: float) -> Blocks:

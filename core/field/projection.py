@@ -39,12 +39,14 @@ class Projection:
     past_rim : (m,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
     spread   : (m,) float32, how far the patches it was found with are off it, root mean square; inf past rims, and
                where samples of other sheets are near
+    sample   : (m,) int32, the sample nearest to the query
     """
 
     distance: np.ndarray
     step: np.ndarray
     past_rim: np.ndarray
     spread: np.ndarray
+    sample: np.ndarray
 
     @property
     def direction(self) -> np.ndarray:
@@ -86,7 +88,7 @@ def project(surface, x: np.ndarray, progress: Progress, nearest: int = NEAREST) 
     within a few local spacings of the surface; never more than the distance to the nearest sample.
     """
     m = len(x)
-    found = Projection(np.empty(m), np.empty((m, 3)), np.empty(m, bool), np.empty(m, np.float32))
+    found = Projection(np.empty(m), np.empty((m, 3)), np.empty(m, bool), np.empty(m, np.float32), np.empty(m, np.int32))
     chunks = even_chunks(m, CHUNK, progress)
     for part, piece in in_order(lambda part: _project(surface, x[part], nearest), chunks):
         found[part] = piece
@@ -186,7 +188,8 @@ def _onto_sheet(surface, near, anchor):
     past_rim = foot.beyond > 0
     clear = ~past_rim & (bounded == found) & (foot.member.min(axis=1) > MEMBER)
     cosine = np.einsum("im,mi->m", near.normals[:, every, anchor], foot.axis)
-    projection = Projection(bounded, step, past_rim, np.where(clear, foot.spread, np.float32(np.inf)))
+    spread = np.where(clear, foot.spread, np.float32(np.inf))
+    projection = Projection(bounded, step, past_rim, spread, near.sample[:, 0].astype(np.int32))
     return projection, foot.member, np.abs(cosine) > _STRAIGHT
 
 

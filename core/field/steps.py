@@ -1,45 +1,81 @@
 """Steps from the surface to the nodes next to it: there not only the distance is known but also the way."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..lookup import rows_of
-from .grid import CORNERS, node_strides
+from ..parallel import work_through
+from .grid import node_strides
 
 _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point at each other
 
 
 @dataclass(frozen=True)
 class NearBand:
-    """The nodes within two cells of the surface.
+    """The nodes within two cells of the surface, called by the rows that they have here.
 
+    shape    : (nx,ny,nz), nodes of the grid
     node     : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
     past_rim : (b,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
+    sample   : (b,) int32, the sample nearest to the node
     """
 
+    shape: tuple[int, int, int]
     node: np.ndarray
     step: np.ndarray
     past_rim: np.ndarray
+    sample: np.ndarray
 
-    def rows(self, node: np.ndarray) -> np.ndarray:
-        """Where nodes (m,) stand in the band, -1 for those that do not."""
-        return rows_of(node, self.node)
+    @classmethod
+    def without_nodes(cls, shape: tuple[int, int, int]) -> "NearBand":
+        """That of a grid of which no steps are known."""
+        return cls(shape, np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, bool), np.empty(0, np.int32))
 
-    def edges(self, axis: int, shape: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Where the lower and the higher ends of the edges along `axis` of a grid of `shape` stand in the band, (e,)
-        int64 each, of those with both ends in it."""
-        stride = node_strides(shape)[axis]
-        row = self.rows(self.node + stride)
-        low = np.flatnonzero((row >= 0) & (self.node // stride % shape[axis] < shape[axis] - 1))
-        return low, row[low]
+    @cached_property
+    def ahead(self) -> np.ndarray:
+        """(3,b+1) int64: the row of the next node along each axis, -1 where that is not in the band or past the side of
+        the box. The last column is -1, so that steps may follow each other."""
+        found, strides = np.full((3, len(self.node) + 1), -1), node_strides(self.shape)
 
-    def between(
-        self, cells: np.ndarray, shape: tuple[int, int, int], spacing: float, off_rims: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Steps from the surface to places between the nodes of a grid of `shape`, at those of the positions `cells`
-        (m,3), in cells and inside the grid, whose eight corners lie in the band: their rows (r,) and the steps there
-        (r,3) float64. With `off_rims`, no corner's step is one past a rim.
+        def look(axis):
+            row = rows_of(self.node + strides[axis], self.node)
+            found[axis, :-1] = np.where(self.node // strides[axis] % self.shape[axis] < self.shape[axis] - 1, row, -1)
+
+        work_through(look, range(3))
+        return found
+
+    @cached_property
+    def behind(self) -> np.ndarray:
+        """(3,b+1) int64: the same the other way along each axis."""
+        found = np.full_like(self.ahead, -1)
+        for axis, row in enumerate(found):
+            low, high = self.edges(axis)
+            row[high] = low
+        return found
+
+    def edges(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the lower and the higher ends of the grid edges along `axis` with both ends in the band, (e,) each,
+        the lower ones ascending."""
+        high = self.ahead[axis, :-1]
+        low = np.flatnonzero(high >= 0)
+        return low, high[low]
+
+    def whole_cells(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of the cells whose lowest nodes have these rows (m,), or -1, those with all eight corners in the band: their
+        numbers (c,), ascending, and the rows of the corners in the order of :data:`CORNERS`, (8,c)."""
+        whole, corner = np.arange(len(row)), row[None]
+        for ahead in self.ahead[::-1]:
+            corner = np.concatenate([corner, ahead[corner]])
+            known = np.flatnonzero(corner.min(axis=0) >= 0)
+            whole, corner = whole[known], corner[:, known]
+        return whole, corner
+
+    def between(self, cells: np.ndarray, spacing: float, off_rims: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Steps from the surface to places between the nodes, at those of the positions `cells` (m,3), in cells and
+        inside the grid, whose eight corners lie in the band: their rows (r,) and the steps there (r,3) float64. With
+        `off_rims`, no corner's step is one past a rim.
 
         An unsigned distance has a kink on the surface, where a trilinear reading of the nodes' values gives a third of
         a cell instead of zero. The step from the foot point, the gradient of u^2 / 2, has none (Ambrosio and
@@ -48,17 +84,15 @@ class NearBand:
         Midway between two sheets it is the step that jumps, from one foot point to the other, and its mean would be a
         sheet that is not there. Steps of neighbouring nodes point at each other there; such cells are left out.
         """
-        lowest = np.clip(np.floor(cells).astype(np.int64), 0, np.array(shape) - 2)
-        strides = node_strides(shape)
-        row = self.rows((lowest @ strides)[:, None] + CORNERS @ strides)
-        chosen = np.flatnonzero((row >= 0).all(axis=1))
+        lowest = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.shape) - 2)
+        chosen, row = self.whole_cells(rows_of(lowest @ node_strides(self.shape), self.node))
         if off_rims:
-            chosen = chosen[~self.past_rim[row[chosen]].any(axis=1)]
-        corner = self.step[row[chosen]].reshape(-1, 2, 2, 2, 3)
-        apart = [np.diff(corner[..., axis], axis=1 + axis).reshape(len(chosen), 4) for axis in range(3)]
-        divergent = np.min(apart, axis=(0, 2)) >= -_TOWARDS * spacing
-        chosen, blend = chosen[divergent], corner[divergent]
+            clear = ~self.past_rim[row].any(axis=0)
+            chosen, row = chosen[clear], row[:, clear]
+        corner = np.stack([self.step[:, axis].take(row) for axis in range(3)]).reshape(3, 2, 2, 2, -1)
+        apart = [np.diff(corner[axis], axis=axis).min(axis=(0, 1, 2)) for axis in range(3)]
+        divergent = np.flatnonzero(np.min(apart, axis=0) >= -_TOWARDS * spacing)
+        chosen, blend = chosen[divergent], corner[..., divergent]
         for share in (cells[chosen] - lowest[chosen]).T:
-            share = share.reshape(-1, *[1] * (blend.ndim - 2))
             blend = (1 - share) * blend[:, 0] + share * blend[:, 1]
-        return chosen, blend
+        return chosen, blend.T

@@ -20,8 +20,8 @@ import numpy as np
 from ..field.grid import CORNERS, Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
-from ..linalg import principal_axes
-from ..lookup import is_among, numbered
+from ..linalg import COMPONENTS, dots, principal_axes
+from ..lookup import numbered
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .first_steps import first_steps
@@ -54,7 +54,9 @@ class Crossings:
 
     def cells_around(self, grid: Grid) -> np.ndarray:
         """The four cells around each edge in cyclic order, by their lowest nodes, (e,4)."""
-        return _cells_around(self.node, self.axis, node_strides(grid.shape))
+        strides = node_strides(grid.shape)
+        first, second = strides[(self.axis + 1) % 3], strides[(self.axis + 2) % 3]
+        return self.node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
 
     @cached_property
     def changing_sides(self) -> np.ndarray:
@@ -64,107 +66,102 @@ class Crossings:
 
 
 def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
-    """Crossings of the zero set, from the nodes near it."""
-    progress, strides, hair = Progress.of(progress), node_strides(grid.shape), _HAIR * grid.spacing
-    meet = meeting_edges(band.node, band.step, surface, grid, strides, hair, progress.part(0.0, 0.4))
+    """Crossings of the zero set, from the nodes near it. On the way edges are called 3 * row + axis, by the row of the
+    lower node in the band."""
+    progress = Progress.of(progress)
+    meet = meeting_edges(band, surface, grid, _HAIR * grid.spacing, progress.part(0.0, 0.4))
     progress(0.4)
-    cells, corner = _whole_cells(band, grid)
-    edge, vote, place = _vote(band, corner, grid, progress.part(0.4, 0.5))
+    lowest, corner = band.whole_cells(np.arange(len(band.node)))
+    edge, vote, share = _vote(band, corner, grid, progress.part(0.4, 0.5))
     progress(0.5)
-    alone = ~is_among(edge, meet.zone) & _may_be_covered(band, edge, place, grid)
-    edge, vote, place = edge[alone], vote[alone], place[alone]
+    alone = _may_be_covered(band, edge, share, grid)
+    alone[np.isin(edge, meet.zone, kind="table")] = False
+    edge, vote = edge[alone], vote[alone]
+    row, axis = np.divmod(edge, 3)
+    place = grid.positions(band.node[row]) + grid.spacing * share[alone, None] * np.eye(3)[axis]
     step, _ = first_steps(place, band, surface, grid, progress.part(0.5, 0.9))
     progress(0.9)
     on = np.linalg.norm(step, axis=1) <= _COVERED * grid.spacing
-    edge, place, vote = edge[on], place[on] - step[on], vote[on]
     once, twice = _once(meet)
-    node, axis = np.divmod(edge, 3)
-    node, axis = np.concatenate([node, meet.node[once]]), np.concatenate([axis, meet.axis[once]])
-    place = np.concatenate([place, meet.place[once]])
-    normal = np.concatenate([np.zeros((len(edge), 3)), meet.normal[once]])
-    crossed = np.concatenate([vote > 0, meet.crossed[once]])
-    certainty = np.concatenate([np.abs(vote), meet.certainty[once]])
-    whole = is_among(_cells_around(node, axis, strides), cells).all(axis=1)
-    node, axis, crossed, certainty = node[whole], axis[whole], crossed[whole], certainty[whole]
+    every = np.concatenate([edge[on], meet.edge[once]])
+    place = np.concatenate([place[on] - step[on], meet.place[once]])
+    normal = np.concatenate([np.zeros((int(on.sum()), 3)), meet.normal[once]])
+    crossed = np.concatenate([vote[on] > 0, meet.crossed[once]])
+    certainty = np.concatenate([np.abs(vote[on]), meet.certainty[once]])
+    whole = _in_whole_cells(band, lowest, every)
+    every, crossed = every[whole], crossed[whole]
     progress(0.95)
-    mend(node, axis, crossed, certainty, strides)
+    mend(band, every, crossed, certainty[whole])
     progress(0.98)
-    twice = twice[is_among(_cells_around(meet.node[twice], meet.axis[twice], strides), cells).all(axis=1)]
+    twice = twice[_in_whole_cells(band, lowest, meet.edge[twice])]
+    row, axis = np.divmod(np.concatenate([every[crossed], meet.edge[twice]]), 3)
     return Crossings(
-        np.concatenate([node[crossed], meet.node[twice]]),
-        np.concatenate([axis[crossed], meet.axis[twice]]),
+        band.node[row],
+        axis,
         np.concatenate([place[whole][crossed], meet.place[twice]]),
-        cells,
+        band.node[lowest],
         np.concatenate([normal[whole][crossed], meet.normal[twice]]),
     )
 
 
-def _may_be_covered(band, edge, place, grid):
-    """Whether the distances at the ends of edges (e,), at most as different as the places are far apart, let these
-    places (e,3) on them be covered, (e,) bool; the others need no projection."""
-    node, axis = np.divmod(edge, 3)
-    along = (place - grid.positions(node)).sum(axis=1)
-    below, above = (
-        np.linalg.norm(band.step[band.rows(end)], axis=1) for end in (node, node + node_strides(grid.shape)[axis])
-    )
-    least = np.maximum(below - along, above - (grid.spacing - along))
+def _may_be_covered(band, edge, share, grid):
+    """Whether the distances at the ends of edges (e,), at most as different as places are far apart, let the place at
+    this `share` (e,) of each be covered, (e,) bool; the others need no projection."""
+    row, axis = np.divmod(edge, 3)
+    away, along = np.linalg.norm(band.step, axis=1), share * grid.spacing
+    least = np.maximum(away[row] - along, away[band.ahead[axis, row]] - (grid.spacing - along))
     return least <= (_COVERED + _SLACK) * grid.spacing
 
 
 def _once(meet):
     """One candidate for each edge that at most one sheet crosses, that one or the least certain; and all crossings of
     edges that several cross."""
-    edge, index = numbered(3 * meet.node + meet.axis)
+    edge, index = numbered(meet.edge)
     several = np.bincount(index, meet.crossed, len(edge))[index] > 1
     order = np.lexsort([meet.certainty, ~meet.crossed, index])
     best = order[np.diff(index[order], prepend=-1) > 0]
     return best[~several[best]], np.flatnonzero(several & meet.crossed)
 
 
-def _cells_around(node, axis, strides):
-    first, second = strides[(axis + 1) % 3], strides[(axis + 2) % 3]
-    return node[:, None] - np.stack([0 * first, first, first + second, second], axis=1)
-
-
-def _whole_cells(band, grid):
-    """Cells with all corners in the band, by their lowest node, (c,) ascending, and the rows of the corners, (c,8)."""
-    at = np.stack(np.unravel_index(band.node, grid.shape), axis=1)
-    lowest = band.node[(at < np.array(grid.shape) - 1).all(axis=1)]
-    corner = np.stack([band.rows(lowest + step) for step in CORNERS @ node_strides(grid.shape)], axis=1)
-    whole = (corner >= 0).all(axis=1)
-    return lowest[whole], corner[whole]
+def _in_whole_cells(band, lowest, edge):
+    """Which edges (e,) have four cells around them whose lowest nodes are among the rows `lowest`, (e,) bool."""
+    whole = np.zeros(len(band.node) + 1, bool)
+    whole[lowest] = True
+    row, axis = np.divmod(edge, 3)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    back = band.behind[first, row]
+    return whole[row] & whole[back] & whole[band.behind[second, back]] & whole[band.behind[second, row]]
 
 
 def _vote(band, corner, grid, progress):
-    """Edges of cells with corners (c,8), as lower node * 3 + axis (e,), votes that they are crossed, positive if so,
-    (e,), and the likely places (e,3)."""
-    chunks = even_chunks(len(corner), _CHUNK, progress)
-    cast = in_order(lambda part: _ballots(band.step[corner[part]], grid), chunks)
-    ballots = zip((np.empty(0),) * 3, *(found for _, found in cast), strict=True)
-    number = (3 * corner[:, _EDGES[:, 0]] + _EDGE_AXIS).reshape(-1)
-    counts = in_order(lambda each: np.bincount(number, np.concatenate(each)), ballots)
+    """Edges of cells with corners (8,c), (e,) ascending, votes that they are crossed, positive if so, (e,), and which
+    share of each is likely below the surface, (e,)."""
+    steps = np.ascontiguousarray(band.step.T)
+    chunks = even_chunks(corner.shape[1], _CHUNK, progress)
+    cast = in_order(lambda part: _ballots(steps.take(corner[:, part], axis=1), grid.spacing), chunks)
+    ballots = zip((np.empty((12, 0)),) * 3, *(found for _, found in cast), strict=True)
+    edge = (3 * corner[_EDGES[:, 0]] + _EDGE_AXIS[:, None]).reshape(-1)
+    counts = in_order(lambda each: np.bincount(edge, np.concatenate(each, axis=1).reshape(-1)), ballots)
     vote, weight, share = (count for _, count in counts)
     voted = np.flatnonzero(weight)
-    row, axis = np.divmod(voted, 3)
-    share = share[voted] / weight[voted]
-    place = grid.positions(band.node[row]) + grid.spacing * share[:, None] * np.eye(3)[axis]
-    return 3 * band.node[row] + axis, vote[voted], place
+    return voted, vote[voted], share[voted] / weight[voted]
 
 
-def _ballots(step, grid):
-    """For each edge of cells with steps (c,8,3) to their corners, the vote that it is crossed, how certain that is, and
-    where along it the surface is, times that; (12 c,) each."""
-    side = _sides(step + _HAIR * grid.spacing)
-    a, b = side[:, _EDGES[:, 0]].reshape(-1), side[:, _EDGES[:, 1]].reshape(-1)
-    certain = np.minimum(np.abs(a), np.abs(b)) + 1e-9 * grid.spacing
-    share = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
-    return np.where((a >= 0) != (b >= 0), certain, -certain), certain, certain * share
+def _ballots(step, cell):
+    """For each edge of cells with steps (3,8,c) to their corners, the vote that it is crossed, how certain that is, and
+    where along it the surface is, times that; (12,c) each."""
+    side = _sides(step + cell * _HAIR[:, None, None])
+    low, high = side[_EDGES[:, 0]], side[_EDGES[:, 1]]
+    parted, below, above = (low >= 0) != (high >= 0), np.abs(low), np.abs(high)
+    certain = np.minimum(below, above) + 1e-9 * cell
+    share = below / np.maximum(below + above, np.finfo(float).tiny)
+    return np.where(parted, certain, -certain), certain, certain * share
 
 
 def _sides(step):
-    """Signed distances of the corners of cells along the cell's normal, (c,8), from the steps to them (c,8,3); the sign
+    """Signed distances of the corners of cells along the cell's normal, (8,c), from the steps to them (3,8,c); the sign
     is the cell's own."""
-    slope = np.einsum("cki,kj->cij", step, CORNERS - 0.5)
-    slope = slope + slope.transpose(0, 2, 1)
-    normal = principal_axes(slope[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
-    return np.einsum("cki,ci->ck", step, normal)
+    box = step.reshape(3, 2, 2, 2, -1)
+    slope = np.stack([np.diff(box, axis=1 + axis).sum(axis=(1, 2, 3)) for axis in range(3)])
+    normal = principal_axes(np.stack([slope[i, j] + slope[j, i] for i, j in COMPONENTS], axis=1))
+    return dots(step, normal.T)

@@ -26,7 +26,7 @@ def first_steps(
     def read(part):
         cells = (x[part] - grid.origin) / grid.spacing
         inside = np.flatnonzero(((cells >= 0) & (cells <= np.array(grid.shape) - 1)).all(axis=1))
-        row, between = band.between(cells[inside], grid.shape, grid.spacing, off_rims=True)
+        row, between = band.between(cells[inside], grid.spacing, off_rims=True)
         return part.start + inside[row], between
 
     for _, (row, between) in in_order(read, even_chunks(len(x), _CHUNK, progress.part(0.0, 0.3))):

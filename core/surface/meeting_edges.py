@@ -7,7 +7,8 @@ import numpy as np
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER
-from ..lookup import rows_of
+from ..field.steps import NearBand
+from ..linalg import row_dots
 from ..progress import Progress
 from .meetings import meetings
 from .sheets import Sheets, one_sheet, sheets_near
@@ -22,7 +23,6 @@ _GAP, _STEP, _FAR = (
     1.5,
     2.0,
 )  # local spacings to the last sample and to the place, cells; gaps closed before a sheet
-_CHUNK = 1 << 17  # nodes
 _STRAIGHT = 0.7  # cosine between the way out of the sheet and the way to the other
 
 
@@ -30,13 +30,13 @@ _STRAIGHT = 0.7  # cosine between the way out of the sheet and the way to the ot
 class MeetingEdges:
     """Candidates of crossings, each of one edge and one sheet.
 
-    node, axis : (e,) int64, the edge     place, normal : (e,3) float64, on the sheet     crossed : (e,) bool
-    certainty  : (e,) float64, distance of the nearer end from the sheet
-    zone       : (z,) int64, 3 * node + axis of all edges that were looked at, sorted
+    edge      : (e,) int64, 3 * row of its lower node in the band + axis
+    place, normal : (e,3) float64, on the sheet     crossed : (e,) bool
+    certainty : (e,) float64, distance of the nearer end from the sheet
+    zone      : (z,) int64, all edges that were looked at
     """
 
-    node: np.ndarray
-    axis: np.ndarray
+    edge: np.ndarray
     place: np.ndarray
     normal: np.ndarray
     crossed: np.ndarray
@@ -44,35 +44,26 @@ class MeetingEdges:
     zone: np.ndarray
 
 
-def meeting_edges(node, step, surface: LocalSurface, grid: Grid, strides, hair, progress=None) -> MeetingEdges:
-    """Edges between near nodes (flat index (b,), ascending, and steps from their foot points (b,3)) whose nearest
-    sample is where sheets meet; `hair` (3,) decides the side of nodes that lie on a sheet."""
+def meeting_edges(band: NearBand, surface: LocalSurface, grid: Grid, hair, progress=None) -> MeetingEdges:
+    """Edges between nodes close to the surface whose nearest sample is where sheets meet; `hair` (3,) decides the side
+    of nodes that lie on a sheet."""
     progress, cell = Progress.of(progress), grid.spacing
-    node = node[np.einsum("bi,bi->b", step, step) <= (_NEAR * cell) ** 2]
-    node = node[_at_meetings(grid.positions(node), surface, progress)]
-    if not len(node):
+    row = np.flatnonzero(row_dots(band.step, band.step) <= (_NEAR * cell) ** 2)
+    row = row[meetings(surface, progress.part(0.0, 0.3))[band.sample[row]]]
+    if not len(row):
         none, nowhere = np.empty(0, np.int64), np.empty((0, 3))
-        return MeetingEdges(none, none, nowhere, nowhere, np.empty(0, bool), np.empty(0), none)
-    x = grid.positions(node)
-    ahead = [rows_of(node + stride, node) for stride in strides]
-    back = [rows_of(node - stride, node) for stride in strides]
+        return MeetingEdges(none, nowhere, nowhere, np.empty(0, bool), np.empty(0), none)
+    x, number = grid.positions(band.node[row]), np.full(len(band.node) + 1, -1)
+    number[row] = np.arange(len(row))
+    ahead, back = number[band.ahead[:, row]], number[band.behind[:, row]]
     sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.3, 0.9))
     found = [_along(axis, ahead[axis], sheets, x, cell, hair) for axis in range(3)]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
     one, place, normal, crossed, certainty, beyond, near = (np.concatenate(part) for part in zip(*found, strict=True))
-    kept = _reaches(place, normal, beyond, sheets, near, surface, len(node), cell)
-    zone = np.concatenate([3 * node[ahead[a] >= 0] + a for a in range(3)])
-    return MeetingEdges(
-        node[one[kept]], axis[kept], place[kept], normal[kept], crossed[kept], certainty[kept], np.sort(zone)
-    )
-
-
-def _at_meetings(x, surface, progress):
-    """Whether the samples nearest to positions (m,3) are where sheets meet, (m,) bool."""
-    meet, found = meetings(surface, progress.part(0.0, 0.2)), np.zeros(len(x), bool)
-    for part in progress.part(0.2, 0.3).chunks(len(x) if meet.any() else 0, _CHUNK):
-        found[part] = meet[surface.tree.query(x[part], workers=-1)[1]]
-    return found
+    kept = _reaches(place, normal, beyond, sheets, near, surface, len(row), cell)
+    edge = 3 * row[one[kept]] + axis[kept]
+    zone = np.concatenate([3 * row[ahead[a] >= 0] + a for a in range(3)])
+    return MeetingEdges(edge, place[kept], normal[kept], crossed[kept], certainty[kept], zone)
 
 
 def _along(axis, ahead, sheets, x, cell, hair):

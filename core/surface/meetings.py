@@ -1,8 +1,8 @@
 """Where several sheets meet, cross, or run close to each other.
 
 A crease or a tight bend looks like two sheets to a few samples, too. Two samples lie on different sheets where neither
-is on the other's tangent plane, where no chain of samples leads from one to the other along the surface, and where
-their sheets either run side by side or one goes on past the other's plane; where most pairs of a neighbourhood do.
+is on the other's tangent plane, where no sample between them lies on one sheet with both, and where their
+sheets either run side by side or one goes on past the other's plane; where most pairs of a neighbourhood do.
 """
 
 import numpy as np
@@ -14,8 +14,7 @@ from ..parallel import even_chunks, in_order
 from ..progress import Progress
 
 NEIGHBOURS = 32
-_CHAIN = 2  # links
-_LINKED = 0.8  # least confidence of samples in a chain
+_LINKED = 0.8  # least confidence of samples that link others
 _SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
 _WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least membership of them
 _PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
@@ -28,7 +27,9 @@ def meetings(surface: LocalSurface, progress=None) -> np.ndarray:
     progress, n = Progress.of(progress), len(surface.points)
     nearest, member = _members(surface, np.arange(n), NEIGHBOURS + 1, progress)
     alike = member > MEMBER
-    i, at = np.nonzero(~alike & (surface.confidence[nearest] >= TRUSTED) & (surface.confidence >= TRUSTED)[:, None])
+    trusted = surface.confidence >= TRUSTED
+    unlike = ~alike & trusted[nearest] & trusted[:, None]
+    i, at = np.nonzero(unlike)
     j = nearest[i, at]
     if not len(i):
         return np.zeros(n, bool)
@@ -36,22 +37,17 @@ def meetings(surface: LocalSurface, progress=None) -> np.ndarray:
     cosine = np.abs(np.einsum("mi,mi->m", surface.normals[i], surface.normals[j]))
     askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
     apart[askew] = _goes_past(i[askew], j[askew], surface)
-    around = csr_matrix((np.ones(nearest.size), (np.repeat(np.arange(n), nearest.shape[1]), nearest.reshape(-1))))
-    pairs, found = around @ np.bincount(i, minlength=n), around @ np.bincount(i, apart, n)
+    pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
     return (found >= _LEAST) & (found >= _SHARE * pairs)
 
 
 def _linked(i, j, nearest, alike, sure):
-    """Whether samples i and j, (m,) each, have a chain of alike neighbours between them."""
-    n = len(nearest)
-    row, at = np.nonzero(alike & sure[:, None] & sure[nearest])
-    links = csr_matrix((np.ones(len(row), np.int32), (row, nearest[row, at])), shape=(n, n))
+    """Whether samples i and j, (m,) each, have a sure sample between them that is an alike neighbour of both."""
+    n, kept = len(nearest), alike & sure[:, None] & sure[nearest]
+    first = np.append(0, np.cumsum(kept.sum(axis=1)))
+    links = csr_matrix((np.ones(first[-1], np.int8), nearest[kept], first), shape=(n, n))
     links = links + links.T
-    start, row = np.unique(i, return_inverse=True)
-    reached = links[start]
-    for _ in range(_CHAIN - 1):
-        reached = reached @ links
-    return np.asarray(reached[row, j]).reshape(-1) > 0
+    return np.asarray(links[i].multiply(links[j]).sum(axis=1)).reshape(-1) > 0
 
 
 def _goes_past(i, j, surface):

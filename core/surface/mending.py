@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..field.steps import NearBand
 from ..lookup import numbered
 
 _ROUNDS = 3
@@ -12,56 +13,66 @@ _LONGEST = 32  # odd faces of a loop that is closed
 _STEPS = 2  # per odd face, after which a loop is left as it was
 
 
-def mend(node, axis, crossed, certainty, strides) -> None:
+def mend(band: NearBand, edge, crossed, certainty) -> None:
     """Turn over, in place, crossings that leave faces odd.
 
-    node, axis : (e,) int64, the edges that lie near the surface, by their lower node and direction
-    crossed    : (e,) bool     certainty : (e,) float64, the least certain edges turn first
-    strides    : (3,) steps of the flat node index
+    edge    : (e,) int64, the edges that lie near the surface, 3 * row of their lower node in the band + direction; all
+              corners of the cells around them are in the band, too
+    crossed : (e,) bool     certainty : (e,) float64, the least certain edges turn first
 
     First edges most of whose faces are odd are turned over; edges that share a face never at once. This takes single
     notches and spurs off rims, too. The odd faces left form loops, because every cell has an even number of them: long
     ones are rims; short ones, pinholes and fringes, are shrunk edge by edge, and stay where they do not vanish.
     """
-    size = int(node.max(initial=0)) + 1
-    key, faces = _faces(node, axis, size, strides)
-    crossings = np.bincount(faces[crossed].reshape(-1), minlength=len(key))
-    for group in _apart(node, axis, strides) * _ROUNDS:
+    faces = _faces(band, edge)
+    crossings = np.bincount(faces[crossed].reshape(-1), minlength=3 * len(band.node))
+    for group in _apart(band, edge) * _ROUNDS:
         turned = group[(crossings[faces[group]] % 2).sum(axis=1) >= _MAJORITY]
         change = np.where(crossed[turned], -1, 1)[:, None]
         np.add.at(crossings, faces[turned], change)
         crossed[turned] ^= True
-    odd = np.flatnonzero(crossings % 2)
-    loops = [odd[loop] for loop in _short_loops(key[odd], size, strides)]
-    _shrink_loops(faces, crossed, crossings, certainty, loops)
+    number = np.full(crossings.size, -1)
+    number[edge] = np.arange(len(edge))
+    loops = _short_loops(band, np.flatnonzero(crossings % 2))
+    _shrink_loops(lambda face: number[_around(band, face)], faces, crossed, crossings, certainty, loops)
 
 
-def _faces(node, axis, size, strides):
-    """Distinct keys of grid faces, direction across * size + lowest node, and which four are at each edge, (e,4)."""
-    sides = [(axis + 1) % 3, (axis + 2) % 3]
-    faces = [across * size + node - back * strides[along] for along, across in (sides, sides[::-1]) for back in (0, 1)]
-    return numbered(np.stack(faces, axis=1))
+def _faces(band, edge):
+    """The four grid faces at each edge, 3 * row of their lowest node in the band + direction across, (e,4)."""
+    row, axis = np.divmod(edge, 3)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    below, beside = band.behind[first, row], band.behind[second, row]
+    return np.stack([3 * row + second, 3 * below + second, 3 * row + first, 3 * beside + first], axis=1)
 
 
-def _apart(node, axis, strides):
+def _around(band, face):
+    """The four edges around each face (f,), (f,4)."""
+    row, across = np.divmod(face, 3)
+    first, second = (across + 1) % 3, (across + 2) % 3
+    above, beside = band.ahead[second, row], band.ahead[first, row]
+    return np.stack([3 * row + first, 3 * above + first, 3 * row + second, 3 * beside + second], axis=1)
+
+
+def _apart(band, edge):
     """The edges, (e,) in twelve groups, no two of which share a face."""
-    at = np.stack([node // strides[0], node % strides[0] // strides[1], node % strides[1]], axis=1) % 2
-    every = np.arange(len(node))
-    colour = 4 * axis + 2 * at[every, (axis + 1) % 3] + at[every, (axis + 2) % 3]
+    row, axis = np.divmod(edge, 3)
+    at = np.stack(np.unravel_index(band.node, band.shape)) % 2
+    colour = 4 * axis + 2 * at[(axis + 1) % 3, row] + at[(axis + 2) % 3, row]
     return [np.flatnonzero(colour == c) for c in range(12)]
 
 
-def _shrink_loops(faces, crossed, crossings, certainty, loops):
+def _shrink_loops(around, faces, crossed, crossings, certainty, loops):
     """Turn over edges of two odd faces or more until the loop is gone. Edges at a face with three crossings or more may
-    be turned off, others on only, so that no small sheet shrinks."""
-    by_face = np.argsort(faces.reshape(-1), kind="stable") // 4
-    first = np.concatenate([[0], np.cumsum(np.bincount(faces.reshape(-1), minlength=len(crossings)))])
+    be turned off, others on only, so that no small sheet shrinks.
+
+    around : function that gives the edges around faces (f,), (f,4), -1 for those that are not near the surface
+    """
     for loop in loops:
         odd = {face for face in loop.tolist() if crossings[face] % 2}
         turned = []
         while odd and len(turned) < _STEPS * len(loop):
-            edge = np.unique(np.concatenate([by_face[first[face] : first[face + 1]] for face in odd]))
-            edge = edge[~np.isin(edge, turned)]
+            edge = np.unique(around(np.array(list(odd))))
+            edge = edge[(edge >= 0) & ~np.isin(edge, turned)]
             edge = edge[~crossed[edge] | (crossings[faces[edge]] >= 3).any(axis=1)]
             gain = (crossings[faces[edge]] % 2).sum(axis=1)
             if gain.max(initial=0) < 2:
@@ -81,13 +92,12 @@ def _turn(edge, faces, crossed, crossings):
     crossings[faces[edge]] += 1 if crossed[edge] else -1
 
 
-def _short_loops(key, size, strides):
-    """Loops of the odd faces with keys (o,) that go from cell to cell: arrays of at most 32 indices into `key`."""
-    across, node = np.divmod(key, size)
-    cell, at = numbered(np.concatenate([node, node - strides[across]]))
-    graph = coo_matrix((np.ones(len(key), bool), tuple(at.reshape(2, -1))), shape=(len(cell),) * 2)
-    _, part = connected_components(graph, directed=False)
-    part = part[at[: len(key)]]
+def _short_loops(band, odd):
+    """Loops of the odd faces (o,) that go from cell to cell: arrays of at most 32 of them."""
+    row, across = np.divmod(odd, 3)
+    cell, at = numbered(np.stack([row, band.behind[across, row]]))
+    graph = coo_matrix((np.ones(len(odd), bool), tuple(at)), shape=(len(cell),) * 2)
+    part = connected_components(graph, directed=False)[1][at[0]]
     order = np.argsort(part, kind="stable")
-    loops = np.split(order, np.flatnonzero(np.diff(part[order])) + 1)
+    loops = np.split(odd[order], np.flatnonzero(np.diff(part[order])) + 1)
     return [loop for loop in loops if 0 < len(loop) <= _LONGEST]

@@ -34,8 +34,8 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
     """
     away = at_nodes(values, band.node).astype(np.float64)
     toward = (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
-    height = np.zeros(len(away))
-    for _, (ends, found) in in_order(lambda axis: _ridges(band, away, toward, grid, axis), range(3)):
+    height, edges = np.zeros(len(away)), [(axis, *band.edges(axis)) for axis in range(3)]
+    for _, (ends, found) in in_order(lambda each: _ridges(*each, away, toward, grid.spacing), edges):
         for end in ends:
             np.maximum.at(height, end, found)
     row = np.flatnonzero(height)
@@ -57,14 +57,13 @@ def _averaged(height, place, reach):
     return np.mean(height.take(near, mode="clip"), axis=1, where=np.isfinite(away))
 
 
-def _ridges(band, away, toward, grid, axis):
-    """Rows in the band of both ends of the grid edges along `axis` with a ridge between, (2,e), and its height (e,):
-    where the planes through both feet are equally far."""
-    low, high = band.edges(axis, grid.shape)
+def _ridges(axis, low, high, away, toward, cell):
+    """Of grid edges along `axis` between rows `low` and `high` of the band, those with a ridge between, as rows of both
+    ends (2,e), and its height (e,): where the planes through both feet are equally far."""
     met = (toward[axis, low] > 0) & (toward[axis, high] < 0)
     low, high = low[met], high[met]
     facing = dots(toward[:, low], toward[:, high]) < _FACING
     low, high = low[facing], high[facing]
-    rise, fall, cell = toward[axis, low], -toward[axis, high], grid.spacing
+    rise, fall = toward[axis, low], -toward[axis, high]
     along = np.clip((away[high] - away[low] + cell * fall) / (rise + fall), 0, cell)
     return np.stack([low, high]), away[low] + along * rise

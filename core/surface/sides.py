@@ -11,6 +11,7 @@ sides: a hollow ball is inside between its walls, and outside within.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import diags
@@ -43,17 +44,32 @@ class Sides:
     alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
                 an open surface
     within    : (w,) bool, whether that side is the inside
-    share     : float in [0,1], of all crossings that these are
-    spanned   : float, where the sides differ and no crossing is, relative to all crossings: openings
-    largest   : float, the largest connected patch of either, relative to all crossings
+    gaps      : (g,3) float64, middles of edges where the sides differ and no crossing is: openings
+    crossings : int, number of crossed edges     grid : Grid of the nodes
     """
 
     inside: np.ndarray | Blocks
     alike: np.ndarray
     within: np.ndarray
-    share: float
-    spanned: float
-    largest: float
+    gaps: np.ndarray
+    crossings: int
+    grid: Grid
+
+    @property
+    def share(self) -> float:
+        """Share of the crossings that have one side at both ends."""
+        return len(self.alike) / max(self.crossings, 1)
+
+    @property
+    def spanned(self) -> float:
+        """Number of edges that span openings, relative to all crossings."""
+        return len(self.gaps) / max(self.crossings, 1)
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest connected patch of either, relative to all crossings."""
+        most = max(np.bincount(patches(middle, self.grid)).max(initial=0) for middle in (self.alike, self.gaps))
+        return most / max(self.crossings, 1)
 
     @property
     def closed(self) -> bool:
@@ -96,16 +112,7 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     differ = inside_a != at_nodes(inside, b)
     alike, spanned = crossed & ~differ, ~crossed & differ
     same, gaps = (0.5 * (grid.positions(a[chosen]) + grid.positions(b[chosen])) for chosen in (alike, spanned))
-    largest = max(np.bincount(patches(middle, grid)).max(initial=0) for middle in (same, gaps))
-    total = max(int(crossed.sum()), 1)
-    return Sides(
-        inside=inside,
-        alike=same,
-        within=inside_a[alike],
-        share=int(alike.sum()) / total,
-        spanned=int(spanned.sum()) / total,
-        largest=largest / total,
-    )
+    return Sides(inside, same, inside_a[alike], gaps, int(crossed.sum()), grid)
 
 
 def needed_band(surface: LocalSurface, grid: Grid) -> float:
@@ -122,30 +129,31 @@ def _far(surface, grid):
 def _edges_of(node, near, crossings, grid):
     """Grid edges with an end among the nodes, those marked in `near`, none of which lies on the side of the box: their
     ends (e,), (e,) and whether the surface crosses them."""
-    keys = []
+    low, high, crossed = [], [], []
+    changing, along = np.divmod(crossings.changing_sides, 3)
     for axis, stride in enumerate(node_strides(grid.shape)):
         below = node - stride
-        keys += [3 * node + axis, 3 * below[~at_nodes(near, below)] + axis]
-    keys = np.concatenate(keys)
-    node, axis = np.divmod(keys, 3)
-    return node, node + node_strides(grid.shape)[axis], is_among(keys, crossings.changing_sides)
+        for each_low in (node, below[~at_nodes(near, below)]):
+            low.append(each_low)
+            high.append(each_low + stride)
+            crossed.append(is_among(each_low, changing[along == axis]))
+    return tuple(np.concatenate(each) for each in (low, high, crossed))
 
 
 def _sides(a, b, crossed, n, outside, progress):
     """The side of each of n clusters in [-1,1], from edges (a, b) between them; cluster `outside` is 1."""
     kept = a != b
     a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
-    links = symmetric(weight, a, b, n)
-    degree = np.bincount(np.r_[a, b], minlength=n).astype(float)
-    free = np.flatnonzero(np.arange(n) != outside)
-    matrix = (diags(degree) - links)[free][:, free]
-    push = np.asarray(links[free, outside].todense()).reshape(-1)
+    degree = np.bincount(np.append(a, b), minlength=n).astype(float)
+    degree[outside] = 0
+    free = (a != outside) & (b != outside)
+    matrix = diags(degree) - symmetric(weight[free], a[free], b[free], n)
+    push = np.bincount((a + b - outside)[~free], weight[~free], n)
     progress(0.3)
-    scales = diags(1 / np.maximum(degree[free], 1.0))
+    scales = diags(1 / np.maximum(degree, 1.0))
     looks = progress.part(0.4, 0.7).each(range(_STEPS))
-    found, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
-    side = np.ones(n)
-    side[free] = found
+    side, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
+    side[outside] = 1
     return side
 
 

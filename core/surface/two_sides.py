@@ -22,7 +22,7 @@ from ..field.blocks import Blocks, each, put
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
-from ..linalg import symmetric
+from ..linalg import row_dots, symmetric
 from ..lookup import is_among, numbered
 from ..progress import Progress
 from .crossings import Crossings
@@ -54,7 +54,7 @@ def two_sided(
 
     values : (nx,ny,nz) float32 or Blocks, unsigned distances; the result is alike
     """
-    votes = _votes(band, crossings, grid)
+    votes = _votes(band, crossings)
     sure = votes.sure()
     progress(0.1)
     sample, height = _heights(band, surface, grid)
@@ -86,8 +86,8 @@ class _Votes:
         return symmetric(self.sign, self.low, self.high, n)
 
 
-def _votes(band, crossings, grid):
-    edges = [band.edges(axis, grid.shape) for axis in range(3)]
+def _votes(band, crossings):
+    edges = [band.edges(axis) for axis in range(3)]
     key = np.concatenate([3 * band.node[low] + axis for axis, (low, _) in enumerate(edges)])
     low, high = np.concatenate(edges, axis=1)
     crossed = is_among(key, crossings.changing_sides)
@@ -98,12 +98,13 @@ def _votes(band, crossings, grid):
 def _heights(band, surface, grid):
     """The sample that each node of the band goes with, (b,), the nearest of those that nodes off the rims go with, and
     how far the node is off the surface to the side that the sample's normal shows, (b,); past rims, off its plane."""
-    x, sample, past = grid.positions(band.node), np.empty(len(band.node), np.int64), band.past_rim
-    sample[~past] = surface.tree.query(x[~past], workers=-1)[1]
-    seen = np.arange(surface.tree.n) if past.all() else np.unique(sample[~past])
-    sample[past] = seen[KDTree(surface.points[seen]).query(x[past], workers=-1)[1]]
-    step = np.where(past[:, None], x - surface.points[sample], band.step)
-    return sample, np.einsum("bi,bi->b", step, surface.normals[sample])
+    sample, step, past = band.sample.astype(np.int64), band.step.copy(), np.flatnonzero(band.past_rim)
+    seen = np.bincount(sample[~band.past_rim], minlength=surface.tree.n) > 0
+    seen = np.flatnonzero(seen if seen.any() else ~seen)
+    x = grid.positions(band.node[past])
+    sample[past] = seen[KDTree(surface.points[seen]).query(x, workers=-1)[1]]
+    step[past] = x - surface.points[sample[past]]
+    return sample, row_dots(step, surface.normals[sample])
 
 
 def _sides_of_nodes(votes, sure, sample, height, progress):

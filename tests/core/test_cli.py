@@ -11,11 +11,11 @@ import pytest
 from plyfile import PlyData
 
 from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
-from core.field.steps import NearBand
 from core.io.openvdb_module import load_openvdb
 from core.io.ply import write_points
 from core.io.points import read_points, read_scan
 from core.settings import default_in_words, options
+from tests.bands import near_band
 
 ROOT = Path(__file__).parents[2]
 REPORT = {
@@ -55,7 +55,7 @@ def calls(monkeypatch):
                 np.zeros(3),
                 0.25,
                 sdf=settings.surface == "signed",
-                near=NearBand(np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]]), np.zeros(2, bool)),
+                near=near_band((4, 4, 4), np.array([21, 22]), np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.0]])),
             ),
             mesh if settings.surface in ("double", "both", "signed") else None,
             mesh if settings.surface in ("single", "both") else None,

@@ -8,6 +8,7 @@ import pytest
 from core import Settings, reconstruct
 from core.field.steps import NearBand
 from tests import shapes
+from tests.bands import near_band
 
 SHAPE = (24, 20, 28)
 
@@ -17,11 +18,11 @@ def band(foot_of, width=2.0):
     nodes = np.indices(SHAPE).reshape(3, -1).T.astype(float)
     step = nodes - foot_of(nodes)
     near = np.flatnonzero(np.linalg.norm(step, axis=1) <= width)
-    return NearBand(near, step[near], np.zeros(len(near), bool))
+    return near_band(SHAPE, near, step[near])
 
 
 def distances(band, x):
-    row, step = band.between(x, SHAPE, 1.0)
+    row, step = band.between(x, 1.0)
     return row, np.linalg.norm(step, axis=1)
 
 
@@ -82,12 +83,12 @@ def test_no_sheet_appears_midway_between_two(gap):
 def test_edges_have_both_ends_in_the_band_and_end_at_the_sides_of_the_box():
     shape, marked = (4, 5, 6), np.random.default_rng(0).random((4, 5, 6)) < 0.6
     node = np.flatnonzero(marked)
-    band = NearBand(node, np.zeros((len(node), 3)), np.zeros(len(node), bool))
+    band = near_band(shape, node, np.zeros((len(node), 3)))
     for axis in range(3):
         expected = np.moveaxis(marked, axis, 0)[:-1] & np.moveaxis(marked, axis, 0)[1:]
         at = np.argwhere(np.moveaxis(np.insert(expected, len(expected), False, axis=0), 0, axis))
         low, high = (np.ravel_multi_index(tuple((at + step).T), shape) for step in (0, np.eye(3, dtype=int)[axis]))
-        found = band.edges(axis, shape)
+        found = band.edges(axis)
         np.testing.assert_array_equal(node[found[0]], low)
         np.testing.assert_array_equal(node[found[1]], high)
 
@@ -96,8 +97,7 @@ def test_positions_away_from_the_band_are_left_out():
     row, _ = distances(band(onto_plane((0, 0, 1), 5.0)), positions())
     assert len(row)
     assert (np.abs(positions()[row, 2] - 5.0) < 3).all()
-    nothing = NearBand(np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, bool))
-    assert not len(distances(nothing, positions())[0])
+    assert not len(distances(NearBand.without_nodes(SHAPE), positions())[0])
 
 
 def test_steps_lead_to_the_foot_points_and_those_past_rims_can_be_left_out():
@@ -105,9 +105,9 @@ def test_steps_lead_to_the_foot_points_and_those_past_rims_can_be_left_out():
     known = band(foot)
     at = np.stack(np.unravel_index(known.node, SHAPE), axis=1)
     rimmed = replace(known, past_rim=at[:, 0] > 11)
-    row, step = rimmed.between(x, SHAPE, 1.0)
+    row, step = rimmed.between(x, 1.0)
     np.testing.assert_allclose(step, (x - foot(x))[row], atol=1e-9)
-    fewer, _ = rimmed.between(x, SHAPE, 1.0, off_rims=True)
+    fewer, _ = rimmed.between(x, 1.0, off_rims=True)
     np.testing.assert_array_equal(fewer, row[x[row, 0] < 11])
 
 

@@ -7,21 +7,21 @@ from core import Cancelled, estimate_normals
 from core.field.grid import Grid, fit_grid, node_strides
 from core.field.integration import BAND, distance_field
 from core.field.local_surface import fit_local_surface
-from core.field.steps import NearBand
 from core.points import local_spacing
 from core.surface.crossings import _HAIR, Crossings, _may_be_covered, find_crossings
 from tests import shapes
+from tests.bands import near_band
 
 GRID = Grid(np.array([-1.31, -1.29, -1.33]), 0.1, (28, 27, 28))
 
 
-def exact_band(foot):
+def exact_band(foot, surface):
     """The band of a shape of which `foot` gives the foot points (m,3) of positions (m,3)."""
     every = np.arange(np.prod(GRID.shape))
     at = GRID.positions(every)
     step = at - foot(at)
     near = np.linalg.norm(step, axis=1) <= BAND * GRID.spacing
-    return NearBand(every[near], step[near], np.zeros(near.sum(), bool))
+    return near_band(GRID.shape, every[near], step[near], sample=surface.tree.query(at[near])[1])
 
 
 def local(points, normals):
@@ -31,7 +31,8 @@ def local(points, normals):
 @pytest.fixture(scope="module")
 def sphere():
     points = shapes.sphere(1500)
-    return exact_band(lambda x: x / np.linalg.norm(x, axis=1, keepdims=True)), local(points, points)
+    surface = local(points, points)
+    return exact_band(lambda x: x / np.linalg.norm(x, axis=1, keepdims=True), surface), surface
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +93,8 @@ def test_nothing_is_crossed_past_the_rim():
         lateral = np.hypot(x[:, 0], x[:, 1])[:, None]
         return x * [1, 1, 0] / np.maximum(lateral, 1)
 
-    found = find_crossings(exact_band(foot), local(points, np.tile([0.0, 0, 1], (len(points), 1))), GRID)
+    surface = local(points, np.tile([0.0, 0, 1], (len(points), 1)))
+    found = find_crossings(exact_band(foot, surface), surface, GRID)
     assert set(found.axis) == {2}
     lateral = np.linalg.norm(GRID.positions(found.node)[:, :2], axis=1)
     assert lateral.max() < 1 + 0.6 * GRID.spacing
@@ -105,16 +107,15 @@ def test_a_sheet_through_grid_nodes_is_one_plane_of_edges():
     points = shapes.square(1500) + np.array([0, 0, plane])
     surface = local(points, np.tile([0.0, 0, 1], (len(points), 1)))
     noise = np.random.default_rng(0).normal(scale=1e-9, size=(np.prod(GRID.shape), 3))
-    found = find_crossings(
-        exact_band(lambda x: np.clip(x, [-1, -1, plane], [1, 1, plane]) + noise[: len(x)]), surface, GRID
-    )
+    band = exact_band(lambda x: np.clip(x, [-1, -1, plane], [1, 1, plane]) + noise[: len(x)], surface)
+    found = find_crossings(band, surface, GRID)
     assert set(found.axis) == {2}
     assert len(set(np.unravel_index(found.node, GRID.shape)[2])) == 1
 
 
 def test_a_band_without_a_whole_cell_crosses_nothing(sphere):
     band, surface = sphere
-    found = find_crossings(NearBand(band.node[:1], band.step[:1], band.past_rim[:1]), surface, GRID)
+    found = find_crossings(near_band(GRID.shape, band.node[:1], band.step[:1]), surface, GRID)
     assert len(found.node) == len(found.cells) == 0
 
 
@@ -140,8 +141,8 @@ def test_edges_left_unprojected_change_nothing(name, monkeypatch):
     found = find_crossings(band, surface, grid)
     spared = []
 
-    def all_of_them(band, edge, place, grid):
-        spared.append((~_may_be_covered(band, edge, place, grid)).mean())
+    def all_of_them(band, edge, share, grid):
+        spared.append((~_may_be_covered(band, edge, share, grid)).mean())
         return np.ones(len(edge), bool)
 
     monkeypatch.setattr("core.surface.crossings._may_be_covered", all_of_them)

@@ -4,10 +4,10 @@ import pytest
 from core.field.grid import fit_grid
 from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
-from core.field.steps import NearBand
 from core.points import local_spacing
 from core.surface.first_steps import first_steps
 from tests import shapes
+from tests.bands import near_band
 from tests.counted import Counted
 
 
@@ -50,6 +50,6 @@ def test_beside_the_rim_and_out_of_the_band_places_are_projected(hemisphere):
 def test_outside_the_box_places_are_projected(hemisphere):
     surface, grid, _ = hemisphere
     every = np.arange(np.prod(grid.shape))
-    known = NearBand(every, surface.project(grid.positions(every)).step, np.zeros(len(every), bool))
+    known = near_band(grid.shape, every, surface.project(grid.positions(every)).step)
     x = grid.origin + grid.spacing * np.array([[-0.5, 12, 12], [12, 12, grid.shape[2] - 0.4]])
     np.testing.assert_array_equal(first_steps(x, known, surface, grid)[0], surface.project(x).step)

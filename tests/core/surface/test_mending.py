@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from core.surface.mending import mend
+from tests.bands import near_band
 
 SIDE = 12
-STRIDES = np.array([SIDE * SIDE, SIDE, 1])
+BAND = near_band((SIDE,) * 3, np.arange(SIDE**3), np.zeros((SIDE**3, 3)))
 NODE, AXIS = (x.reshape(-1) for x in np.meshgrid(np.arange(SIDE**3), np.arange(3), indexing="ij"))
 X, Y, Z = np.unravel_index(NODE, (SIDE,) * 3)
 INNER = ((np.stack([X, Y, Z]) > 0) & (np.stack([X, Y, Z]) < SIDE - 2)).all(axis=0)
@@ -16,7 +17,7 @@ SHEET = (AXIS == 2) & (Z == 5)
 
 def mended(crossed, certainty=None):
     crossed = crossed.copy()
-    mend(NODE, AXIS, crossed, np.ones(len(NODE)) if certainty is None else certainty, STRIDES)
+    mend(BAND, 3 * NODE + AXIS, crossed, np.ones(len(NODE)) if certainty is None else certainty)
     return crossed
 
 
@@ -64,9 +65,9 @@ def test_edges_beyond_those_given_are_not_needed():
     """A hole in which no edge may be crossed."""
     given = ~pick((4, 4, 5, 2), (5, 4, 5, 2), (4, 5, 5, 2), (5, 5, 5, 2))
     crossed = SHEET[given].copy()
-    mend(NODE[given], AXIS[given], crossed, np.ones(given.sum()), STRIDES)
+    mend(BAND, (3 * NODE + AXIS)[given], crossed, np.ones(given.sum()))
     np.testing.assert_array_equal(crossed, SHEET[given])
 
 
 def test_nothing_to_mend():
-    mend(np.empty(0, int), np.empty(0, int), np.empty(0, bool), np.empty(0), STRIDES)
+    mend(BAND, np.empty(0, int), np.empty(0, bool), np.empty(0))

@@ -6,9 +6,9 @@ import pytest
 from core import Settings, reconstruct
 from core.field.blocks import SIDE, blocks_of, put, table_shape
 from core.field.grid import Grid
-from core.field.steps import NearBand
 from core.surface.ridges import raise_ridges
 from tests import shapes
+from tests.bands import near_band
 
 GRID = Grid(np.full(3, -2.0), 0.25, (17, 17, 17))
 NODE = np.arange(17**3)
@@ -21,7 +21,7 @@ def between_planes(gap):
     away = np.abs(half - np.abs(at))
     inside = np.abs(at) < half
     step = np.sign(-at[inside])[:, None] * away[inside, None] * TILTED
-    return NearBand(NODE[inside], step, np.zeros(inside.sum(), bool)), away.reshape(GRID.shape).astype(np.float32)
+    return near_band(GRID.shape, NODE[inside], step), away.reshape(GRID.shape).astype(np.float32)
 
 
 def ends_of_crossing_edges():
@@ -72,7 +72,7 @@ def test_a_node_in_a_crack_stays():
     aslant = 0.46 * GRID.spacing * np.array([0.3, 0.85, 0.43])
     values, step = before.copy(), band.step.copy()
     values.flat[band.node[middle]], step[middle] = np.linalg.norm(aslant), aslant
-    raise_ridges(values, NearBand(band.node, step, band.past_rim), GRID, GRID.spacing)
+    raise_ridges(values, near_band(GRID.shape, band.node, step), GRID, GRID.spacing)
     assert values.flat[band.node[middle]] < 0.5 * GRID.spacing
     assert (values.flat[band.node[below[below != middle]]] > GRID.spacing).all()
 
@@ -82,7 +82,7 @@ def test_a_ridge_of_a_few_nodes_stays():
     band, before = between_planes(2.6)
     near = np.linalg.norm(GRID.positions(band.node), axis=1) < 1.2 * GRID.spacing
     values = before.copy()
-    raise_ridges(values, NearBand(band.node[near], band.step[near], band.past_rim[near]), GRID, GRID.spacing)
+    raise_ridges(values, near_band(GRID.shape, band.node[near], band.step[near]), GRID, GRID.spacing)
     np.testing.assert_array_equal(values, before)
     assert near.sum() > 4
 
@@ -96,7 +96,7 @@ def test_wide_wedges_stay():
     inside = (at[:, :2] > 0).all(axis=1)
     before = np.linalg.norm(step, axis=1).reshape(GRID.shape).astype(np.float32)
     values = before.copy()
-    raise_ridges(values, NearBand(NODE[inside], step[inside], np.zeros(inside.sum(), bool)), GRID, GRID.spacing)
+    raise_ridges(values, near_band(GRID.shape, NODE[inside], step[inside]), GRID, GRID.spacing)
     np.testing.assert_array_equal(values, before)
 
 
@@ -107,7 +107,7 @@ def test_the_sides_of_the_box_are_no_neighbours():
     step = 1.3 * GRID.spacing * at / np.linalg.norm(at, axis=1, keepdims=True).clip(1e-9)
     before = np.full(GRID.shape, GRID.spacing, np.float32)
     values = before.copy()
-    raise_ridges(values, NearBand(NODE[side], step[side], np.zeros(side.sum(), bool)), GRID, GRID.spacing)
+    raise_ridges(values, near_band(GRID.shape, NODE[side], step[side]), GRID, GRID.spacing)
     np.testing.assert_array_equal(values, before)
 
 
