@@ -10,7 +10,8 @@ from scipy.sparse import csr_matrix
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER, TRUSTED, membership
-from ..parallel import even_chunks, in_order
+from ..lookup import numbered
+from ..parallel import even_chunks, in_order, over_rows
 from ..progress import Progress
 
 NEIGHBOURS = 32
@@ -52,23 +53,28 @@ def _linked(i, j, nearest, alike, sure):
 
 def _goes_past(i, j, surface):
     """Whether the sheet of either sample has samples well on both sides of the other's tangent plane."""
-    every = np.unique(np.concatenate([i, j]))
+    n = len(surface.points)
+    pair, number = numbered(np.minimum(i, j) * n + np.maximum(i, j))
+    ends, past = np.stack(np.divmod(pair, n)), np.zeros(len(pair), bool)
+    every, row = numbered(ends)
     wide, member = _members(surface, every, _WIDER, Progress())
     member = (member > _STRAIGHT) & (surface.confidence[wide] >= _LINKED)
+    points, normals = surface.columns.points, surface.normals.T
 
     def look(part):
-        past = np.zeros(len(i[part]), bool)
-        for one, other in ((i[part], j[part]), (j[part], i[part])):
-            row = np.searchsorted(every, one)
-            away = surface.points[wide[row]] - surface.points[other][:, None]
-            height = np.einsum("mki,mi->mk", away, surface.normals[other])
-            limit = _PAST * surface.spacing[one]
-            above = np.where(member[row], height, -np.inf).max(axis=1) > limit
-            past |= above & (np.where(member[row], height, np.inf).min(axis=1) < -limit)
-        return past
+        left = np.arange(len(pair))[part]
+        for one, other in ((0, 1), (1, 0)):
+            at, on = row[one, left], ends[other, left]
+            near, known = wide[at], member[at]
+            height = sum(n.take(on)[:, None] * (x.take(near) - x.take(on)[:, None]) for n, x in zip(normals, points, strict=True))
+            limit = _PAST * surface.spacing[ends[one, left]]
+            above = np.where(known, height, -np.inf).max(axis=1) > limit
+            found = above & (np.where(known, height, np.inf).min(axis=1) < -limit)
+            past[left[found]] = True
+            left = left[~found]
 
-    chunks = even_chunks(len(i), _CHUNK, Progress())
-    return np.concatenate([np.empty(0, bool), *(past for _, past in in_order(look, chunks))])
+    over_rows(look, len(pair), _CHUNK)
+    return past[number]
 
 
 def _members(surface, own, k, progress):
@@ -78,8 +84,9 @@ def _members(surface, own, k, progress):
 
     def look(part):
         near = surface.tree.query(surface.points[own[part]], k=k)[1]
-        between = np.moveaxis(surface.points[near] - surface.points[own[part]][:, None], 2, 0)
-        return near, membership(between, surface.normals[own[part]].T, np.moveaxis(surface.normals[near], 2, 0))
+        points, normals = surface.columns.points, surface.normals.T
+        between = np.stack([x.take(near) - x.take(own[part])[:, None] for x in points])
+        return near, membership(between, surface.normals[own[part]].T, np.stack([n.take(near) for n in normals]))
 
     for part, found in in_order(look, even_chunks(len(own), _CHUNK, progress)):
         nearest[part], member[part] = found

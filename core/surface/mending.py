@@ -25,39 +25,38 @@ def mend(band: NearBand, edge, crossed, certainty) -> None:
     ones are rims; short ones, pinholes and fringes, are shrunk edge by edge, and stay where they do not vanish.
     """
     faces = _faces(band, edge)
-    crossings = np.bincount(faces[crossed].reshape(-1), minlength=3 * len(band.node))
-    for group in _apart(band, edge) * _ROUNDS:
-        turned = group[(crossings[faces[group]] % 2).sum(axis=1) >= _MAJORITY]
-        change = np.where(crossed[turned], -1, 1)[:, None]
-        np.add.at(crossings, faces[turned], change)
-        crossed[turned] ^= True
+    crossings = np.bincount(faces[:, crossed].reshape(-1), minlength=3 * len(band.node)).astype(np.int8)
+    groups = [(group, faces[:, group]) for group in _apart(band, edge)]
+    for group, theirs in groups * _ROUNDS:
+        turned = group[(crossings.take(theirs) & 1).sum(axis=0, dtype=np.int8) >= _MAJORITY]
+        _turn(turned, faces, crossed, crossings)
     number = np.full(crossings.size, -1)
     number[edge] = np.arange(len(edge))
-    loops = _short_loops(band, np.flatnonzero(crossings % 2))
+    loops = _short_loops(band, np.flatnonzero(crossings & 1))
     _shrink_loops(lambda face: number[_around(band, face)], faces, crossed, crossings, certainty, loops)
 
 
 def _faces(band, edge):
-    """The four grid faces at each edge, 3 * row of their lowest node in the band + direction across, (e,4)."""
+    """The four grid faces at each edge, 3 * row of their lowest node in the band + direction across, (4,e)."""
     row, axis = np.divmod(edge, 3)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     below, beside = band.behind[first, row], band.behind[second, row]
-    return np.stack([3 * row + second, 3 * below + second, 3 * row + first, 3 * beside + first], axis=1)
+    return np.stack([3 * row + second, 3 * below + second, 3 * row + first, 3 * beside + first])
 
 
 def _around(band, face):
-    """The four edges around each face (f,), (f,4)."""
+    """The four edges around each face (f,), (4,f)."""
     row, across = np.divmod(face, 3)
     first, second = (across + 1) % 3, (across + 2) % 3
     above, beside = band.ahead[second, row], band.ahead[first, row]
-    return np.stack([3 * row + first, 3 * above + first, 3 * row + second, 3 * beside + second], axis=1)
+    return np.stack([3 * row + first, 3 * above + first, 3 * row + second, 3 * beside + second])
 
 
 def _apart(band, edge):
     """The edges, (e,) in twelve groups, no two of which share a face."""
     row, axis = np.divmod(edge, 3)
     at = np.stack(np.unravel_index(band.node, band.shape)) % 2
-    colour = 4 * axis + 2 * at[(axis + 1) % 3, row] + at[(axis + 2) % 3, row]
+    colour = (4 * axis + 2 * at[(axis + 1) % 3, row] + at[(axis + 2) % 3, row]).astype(np.int8)
     return [np.flatnonzero(colour == c) for c in range(12)]
 
 
@@ -65,31 +64,35 @@ def _shrink_loops(around, faces, crossed, crossings, certainty, loops):
     """Turn over edges of two odd faces or more until the loop is gone. Edges at a face with three crossings or more may
     be turned off, others on only, so that no small sheet shrinks.
 
-    around : function that gives the edges around faces (f,), (f,4), -1 for those that are not near the surface
+    around : function that gives the edges around faces (f,), (4,f), -1 for those that are not near the surface
     """
+    fresh = np.ones(len(crossed), bool)
     for loop in loops:
-        odd = {face for face in loop.tolist() if crossings[face] % 2}
+        odd = {face for face in loop.tolist() if crossings[face] & 1}
         turned = []
         while odd and len(turned) < _STEPS * len(loop):
             edge = np.unique(around(np.array(list(odd))))
-            edge = edge[(edge >= 0) & ~np.isin(edge, turned)]
-            edge = edge[~crossed[edge] | (crossings[faces[edge]] >= 3).any(axis=1)]
-            gain = (crossings[faces[edge]] % 2).sum(axis=1)
+            edge = edge[(edge >= 0) & fresh[edge]]
+            crowd = crossings[faces[:, edge]]
+            gain = (crowd & 1).sum(axis=0) * (~crossed[edge] | (crowd.max(axis=0) >= 3))
             if gain.max(initial=0) < 2:
                 break
-            best = edge[np.lexsort([certainty[edge], -gain])[0]]
+            best = edge[np.lexsort([certainty[edge], -gain])[:1]]
             turned.append(best)
+            fresh[best] = False
             _turn(best, faces, crossed, crossings)
-            for face in faces[best].tolist():
-                (odd.add if crossings[face] % 2 else odd.discard)(face)
-        if odd:
-            for edge in turned:
+            for face in faces[:, best[0]].tolist():
+                (odd.add if crossings[face] & 1 else odd.discard)(face)
+        for edge in turned:
+            fresh[edge] = True
+            if odd:
                 _turn(edge, faces, crossed, crossings)
 
 
 def _turn(edge, faces, crossed, crossings):
+    """Turn over edges that share no face."""
     crossed[edge] ^= True
-    crossings[faces[edge]] += 1 if crossed[edge] else -1
+    crossings[faces[:, edge]] += np.where(crossed[edge], 1, -1).astype(np.int8)
 
 
 def _short_loops(band, odd):
