@@ -4,14 +4,14 @@ Where sheets meet, a border may end at a junction, so a hole beside one is bound
 the other sheet.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ..field.local_surface import LocalSurface
-from ..lookup import rows_of
+from ..lookup import numbered, rows_of
 from .fillings import edge_keys, face_keys, fillings
 from .mesh import Mesh
 
@@ -31,22 +31,36 @@ def fill_pinholes(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
 
     Pieces of border that end at junctions are closed piece by piece first, then those that pass further ones at once.
     """
-    for again in (False, True):
-        mesh = _filled(mesh, surface, cell, again)
-    return mesh
+    borders = _Borders.of(mesh)
+    filled = _filled(mesh, borders, borders.loops, [part for parts in borders.parted for part in parts], surface, cell)
+    if filled is not mesh:
+        borders = _Borders.of(filled)
+    whole = [path for path, parts in zip(borders.paths, borders.parted, strict=True) if len(parts) > 1]
+    return _filled(filled, borders, [], whole, surface, cell)
 
 
-def _filled(mesh, surface, cell, again):
-    edges, counts = mesh.edge_counts()
-    border = edges[counts == 1]
-    loops, paths = _simple_loops(border)
-    parted = [_parted(path, edges[counts > 2]) for path in paths]
-    if again:
-        loops, paths = [], [path for path, parts in zip(paths, parted, strict=True) if len(parts) > 1]
-    else:
-        paths = [part for parts in parted for part in parts]
-    loops += _closed([path for path in paths if len(path) <= _LONGEST], mesh, edges[counts > 1], cell)
-    loops = [loop for loop in loops if len(loop) <= _LONGEST]
+@dataclass(frozen=True)
+class _Borders:
+    """The borders of a mesh: loops of at most 64 edges, and the paths that are left, with the pieces of each between
+    junctions; `edges` (e,2) are all of the mesh and `counts` (e,) the faces of each."""
+
+    edges: np.ndarray
+    counts: np.ndarray
+    loops: list
+    paths: list
+    parted: list
+
+    @classmethod
+    def of(cls, mesh) -> "_Borders":
+        edges, counts = mesh.edge_counts()
+        loops, paths = _simple_loops(_without_long_loops(edges[counts == 1]))
+        return cls(edges, counts, loops, paths, [_parted(path, edges[counts > 2]) for path in paths])
+
+
+def _filled(mesh, borders, loops, paths, surface, cell):
+    edges, counts = borders.edges, borders.counts
+    short = [path for path in paths if len(path) <= _LONGEST]
+    loops = [loop for loop in [*loops, *_closed(short, mesh, edges[counts > 1], cell)] if len(loop) <= _LONGEST]
     if not loops:
         return mesh
     n, at_loop = len(mesh.vertices), np.zeros(len(mesh.vertices), bool)
@@ -58,7 +72,7 @@ def _filled(mesh, surface, cell, again):
     around = surface.tree.query(middle, k=min(_AROUND, surface.tree.n), workers=-1)[1].reshape(len(loops), -1)
     bridged = surface.bridge * np.median(surface.spacing[around], axis=1)
     closed = (longest <= np.maximum(bridged, _UNSEEN * cell)) | (off <= _NEAR * cell)
-    closed &= _doubled(mesh, border, loops) < _DOUBLED
+    closed &= _doubled(mesh, edges[counts == 1], loops) < _DOUBLED
     if not closed.any():
         return mesh
     return replace(mesh, faces=np.concatenate([mesh.faces, triangle[closed[loop]]]).astype(np.int32))
@@ -153,6 +167,16 @@ def _way(graph, start, end, avoided, farthest):
     while before[way[-1]] != start:
         way.append(before[way[-1]])
     return way[1:]
+
+
+def _without_long_loops(edges):
+    """Border edges (e,2) but those of rims: longer loops than are closed, which touch nothing."""
+    corner, ends = numbered(edges)
+    graph = coo_matrix((np.ones(len(edges), bool), tuple(ends.T)), shape=(len(corner),) * 2)
+    part = connected_components(graph, directed=False)[1]
+    branched = np.bincount(part, np.bincount(ends.reshape(-1), minlength=len(corner)) != 2) > 0
+    kept = branched | (np.bincount(part) <= _LONGEST)
+    return edges[kept[part[ends[:, 0]]]]
 
 
 def _simple_loops(edges) -> tuple[list[np.ndarray], list[np.ndarray]]:

@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER, TRUSTED, membership
+from ..linalg import dots
 from ..lookup import numbered
 from ..parallel import even_chunks, in_order, over_rows
 from ..progress import Progress
@@ -66,7 +67,9 @@ def _goes_past(i, j, surface):
         for one, other in ((0, 1), (1, 0)):
             at, on = row[one, left], ends[other, left]
             near, known = wide[at], member[at]
-            height = sum(n.take(on)[:, None] * (x.take(near) - x.take(on)[:, None]) for n, x in zip(normals, points, strict=True))
+            height = sum(
+                n.take(on)[:, None] * (x.take(near) - x.take(on)[:, None]) for n, x in zip(normals, points, strict=True)
+            )
             limit = _PAST * surface.spacing[ends[one, left]]
             above = np.where(known, height, -np.inf).max(axis=1) > limit
             found = above & (np.where(known, height, np.inf).min(axis=1) < -limit)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from .mesh import Mesh
+from ..linalg import cross, dots
+from .mesh import Mesh, at_corners, edge_numbers
 from .spreading import spread_signs
 
 
@@ -19,30 +20,27 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     n = len(mesh.faces)
     if not n:
         return mesh, 0
-    tail, head = mesh.faces.reshape(-1), np.roll(mesh.faces, -1, axis=1).reshape(-1)
-    key = np.minimum(tail, head).astype(np.int64) * len(mesh.vertices) + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    key, owner, forward = key[order], np.repeat(np.arange(n), 3)[order], (tail < head)[order]
-    first = np.flatnonzero(np.diff(key, prepend=-1))
-    count = np.diff(first, append=len(key))
-    pair = first[count == 2]
-    a, b, against = owner[pair], owner[pair + 1], forward[pair] == forward[pair + 1]
+    edge, count = (each.reshape(-1) for each in edge_numbers(mesh.faces, len(mesh.vertices)))
+    owner, forward = np.repeat(np.arange(n), 3), (mesh.faces < np.roll(mesh.faces, -1, axis=1)).reshape(-1)
+    inner, last = count == 2, np.empty(len(count), np.int64)
+    last[edge] = owner
+    pair = (np.bincount(edge, owner).astype(np.int64) - last)[inner], last[inner]
+    against = np.bincount(edge, forward)[inner] != 1
 
-    links = coo_matrix((np.where(against, 2, 1), (a, b)), shape=(n, n)).tocsr()
+    links = coo_matrix((np.where(against, 2, 1), pair), shape=(n, n)).tocsr()
     links = links.maximum(links.T)
     links.data = np.where(links.data == 2, -1, 1)
     sign, patch = spread_signs(links)
     turned = sign < 0
 
-    corners = mesh.vertices[mesh.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outwards = np.einsum("fi,fi->f", normal, corners.mean(axis=1) - mesh.vertices.mean(axis=0))
+    a, b, c = at_corners(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
+    outwards = dots(cross(b - a, c - a), a)
     inwards = np.bincount(patch, np.where(turned, -outwards, outwards)) < 0
     turned ^= inwards[patch]
     halves = np.arange(2 * mesh.pairs).reshape(2, -1)
     whole = patch[halves[0]] == patch[halves[1]]
     turned[halves[1, whole]] = turned[halves[0, whole]]
-    failures = int((against != (turned[a] ^ turned[b])).sum())
+    failures = int((against != (turned[pair[0]] ^ turned[pair[1]])).sum())
     return _with_turned(mesh, turned), failures
 
 

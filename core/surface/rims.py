@@ -14,8 +14,8 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ..field.local_surface import LocalSurface
-from ..linalg import COMPONENTS, principal_axes
-from .mesh import Mesh, edge_numbers
+from ..linalg import COMPONENTS, cross, lengths, principal_axes
+from .mesh import Mesh, at_corners, edge_numbers
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
 _LENGTH = 1.5  # smoothing length, local spacings
@@ -35,7 +35,7 @@ def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     loop = np.flatnonzero(way.any(axis=1))
     if not len(loop):
         return mesh.vertices
-    way, axis, vertices = way[loop], _axes(mesh)[loop], mesh.vertices.copy()
+    way, axis, vertices = way[loop], _axes(mesh, loop), mesh.vertices.copy()
     way -= np.einsum("li,li->l", way, axis)[:, None] * axis
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
     step = cell * way - surface.project(vertices[loop] + cell * way).step
@@ -62,12 +62,12 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     loop = np.flatnonzero((ends == 2) & ~fixed)
     if not len(loop):
         return mesh
-    vertices, axis, beside = mesh.vertices.copy(), _axes(mesh), _neighbours(border, loop)
+    vertices, axis, beside = mesh.vertices.copy(), _axes(mesh, loop), _neighbours(border, loop)
     if at is not None:
         vertices[loop] = at[loop]
     spacing = surface.spacing[surface.tree.query(vertices[loop], workers=-1)[1]]
     step = _fairing(vertices, loop, beside, spacing, cell)
-    step -= np.einsum("li,li->l", step, axis[loop])[:, None] * axis[loop]
+    step -= np.einsum("li,li->l", step, axis)[:, None] * axis
     length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(float).tiny)
     vertices[loop] += step * np.minimum(1.0, _FARTHEST * spacing / length)[:, None]
     _settle(vertices, loop, axis, surface)
@@ -79,12 +79,12 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     row = np.flatnonzero(_grown(ends > 0, graph, rows) & ~_grown(fixed, graph, _CLEAR) & (ends == 0))
     if not len(row):
         return replace(mesh, vertices=vertices)
-    graph = graph[row]
+    graph, axis = graph[row], _axes(mesh, row)
     degree = np.diff(graph.indptr).astype(float)
     vertices[row] += spsolve((diags(degree) - graph[:, row]).tocsc(), graph @ moved)
     for _ in range(_RELAXED):
         step = _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
-        vertices[row] += step - np.einsum("vi,vi->v", step, axis[row])[:, None] * axis[row]
+        vertices[row] += step - np.einsum("vi,vi->v", step, axis)[:, None] * axis
     _settle(vertices, row, axis, surface)
     return replace(mesh, vertices=vertices)
 
@@ -104,14 +104,17 @@ def _outward(vertices, faces):
     return np.stack([np.bincount(ends, np.tile(out[:, a], 2), len(vertices)) for a in range(3)], axis=1)
 
 
-def _axes(mesh):
-    """Normals (v,3) of the vertices, of either sign, whichever way the faces are wound."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.sqrt(np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny))[:, None]
-    corner = mesh.faces.reshape(-1)
-    products = [np.repeat(normal[:, i] * normal[:, j], 3) for i, j in COMPONENTS]
-    tensors = [np.bincount(corner, product, len(mesh.vertices)) for product in products]
+def _axes(mesh, row):
+    """Normals (r,3) of the vertices `row` (r,), of either sign, whichever way the faces are wound."""
+    asked = np.zeros(len(mesh.vertices), bool)
+    asked[row] = True
+    faces = mesh.faces[asked[mesh.faces].any(axis=1)]
+    a, b, c = at_corners(mesh.vertices, faces)
+    normal = cross(b - a, c - a)
+    normal /= np.sqrt(np.maximum(lengths(normal), np.finfo(float).tiny))
+    products = (np.tile(normal[i] * normal[j], 3) for i, j in COMPONENTS)
+    corner = faces.T.reshape(-1)
+    tensors = [np.bincount(corner, product, len(mesh.vertices))[row] for product in products]
     return principal_axes(np.stack(tensors, axis=1))
 
 
@@ -151,6 +154,6 @@ def _grown(chosen, graph, rows):
 
 
 def _settle(vertices, row, axis, surface):
-    """Take vertices back onto the surface along their normals, in place, past its rims too."""
+    """Take the vertices `row` (r,) back onto the surface along their normals (r,3), in place, past its rims too."""
     step = surface.project(vertices[row]).step
-    vertices[row] -= np.einsum("vi,vi->v", step, axis[row])[:, None] * axis[row]
+    vertices[row] -= np.einsum("vi,vi->v", step, axis)[:, None] * axis

@@ -47,5 +47,7 @@ def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress
         direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
         clear = back & (np.einsum("vi,vi->v", direction, way) > 0) & ~found.past_rim
         side[bent[clear]] = direction[clear]
-        vertices = into_corners(vertices, mesh.faces, side, surface, cell, part.part(0.5, 1.0), _INTO)
+        known = side.any(axis=1)
+        beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
+        vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), _INTO)
     return replace(mesh, vertices=vertices)
