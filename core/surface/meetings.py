@@ -67,9 +67,8 @@ def _goes_past(i, j, surface):
         for one, other in ((0, 1), (1, 0)):
             at, on = row[one, left], ends[other, left]
             near, known = wide[at], member[at]
-            height = sum(
-                n.take(on)[:, None] * (x.take(near) - x.take(on)[:, None]) for n, x in zip(normals, points, strict=True)
-            )
+            away = [x.take(near) - x.take(on)[:, None] for x in points]
+            height = dots(away, [axis.take(on)[:, None] for axis in normals])
             limit = _PAST * surface.spacing[ends[one, left]]
             above = np.where(known, height, -np.inf).max(axis=1) > limit
             found = above & (np.where(known, height, np.inf).min(axis=1) < -limit)
