@@ -26,11 +26,12 @@ from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .first_steps import first_steps
 from .meeting_edges import meeting_edges
-from .mending import mend
+from .mending import mend, odd_faces
 
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
 _SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
+_TURNED = 8  # steps along edges from odd faces, up to where edges are turned over
 _CHUNK = 1 << 15  # cells
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
@@ -76,32 +77,55 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     progress(0.5)
     alone = _may_be_covered(band, edge, share, grid)
     alone[np.isin(edge, meet.zone, kind="table")] = False
-    edge, vote = edge[alone], vote[alone]
-    row, axis = np.divmod(edge, 3)
-    place = grid.positions(band.node[row]) + grid.spacing * share[alone, None] * np.eye(3)[axis]
-    step, _ = first_steps(place, band, surface, grid, progress.part(0.5, 0.9))
+    alone = np.flatnonzero(alone)
+    alone = alone[_in_whole_cells(band, lowest, edge[alone])]
+    edge, vote, share = edge[alone], vote[alone], share[alone]
+    once, twice = (each[_in_whole_cells(band, lowest, meet.edge[each])] for each in _once(meet))
+
+    likely, rest = np.flatnonzero(vote > 0), np.flatnonzero(vote <= 0)
+    on, place = _covered(likely, edge, share, band, surface, grid, progress.part(0.5, 0.7))
+    odd = odd_faces(band, np.append(edge[on], meet.edge[once[meet.crossed[once]]]))
+    rest = rest[_beside(band, odd // 3)[edge[rest] // 3]]
+    off, there = _covered(rest, edge, share, band, surface, grid, progress.part(0.7, 0.9))
+    on, place = np.append(on, off), np.concatenate([place, there])
+    order = np.argsort(on)
+    on, place = on[order], place[order]
     progress(0.9)
-    on = np.linalg.norm(step, axis=1) <= _COVERED * grid.spacing
-    once, twice = _once(meet)
-    every = np.concatenate([edge[on], meet.edge[once]])
-    place = np.concatenate([place[on] - step[on], meet.place[once]])
-    normal = np.concatenate([np.zeros((int(on.sum()), 3)), meet.normal[once]])
-    crossed = np.concatenate([vote[on] > 0, meet.crossed[once]])
-    certainty = np.concatenate([np.abs(vote[on]), meet.certainty[once]])
-    whole = _in_whole_cells(band, lowest, every)
-    every, crossed = every[whole], crossed[whole]
-    progress(0.95)
-    mend(band, every, crossed, certainty[whole])
+
+    every = np.append(edge[on], meet.edge[once])
+    place = np.concatenate([place, meet.place[once]])
+    normal = np.concatenate([np.zeros((len(on), 3)), meet.normal[once]])
+    crossed = np.append(vote[on] > 0, meet.crossed[once])
+    mend(band, every, crossed, np.append(np.abs(vote[on]), meet.certainty[once]))
     progress(0.98)
-    twice = twice[_in_whole_cells(band, lowest, meet.edge[twice])]
-    row, axis = np.divmod(np.concatenate([every[crossed], meet.edge[twice]]), 3)
+    row, axis = np.divmod(np.append(every[crossed], meet.edge[twice]), 3)
     return Crossings(
         band.node[row],
         axis,
-        np.concatenate([place[whole][crossed], meet.place[twice]]),
+        np.concatenate([place[crossed], meet.place[twice]]),
         band.node[lowest],
-        np.concatenate([normal[whole][crossed], meet.normal[twice]]),
+        np.concatenate([normal[crossed], meet.normal[twice]]),
     )
+
+
+def _covered(chosen, edge, share, band, surface, grid, progress):
+    """Which of the `chosen` (c,) edges the surface reaches, and where it does, for their rows among all (e,)."""
+    row, axis = np.divmod(edge[chosen], 3)
+    place = grid.positions(band.node[row]) + grid.spacing * share[chosen, None] * np.eye(3)[axis]
+    step, _ = first_steps(place, band, surface, grid, progress)
+    on = np.linalg.norm(step, axis=1) <= _COVERED * grid.spacing
+    return chosen[on], place[on] - step[on]
+
+
+def _beside(band, row):
+    """Which nodes of the band, (b,) bool, lie up to so many steps along grid edges from those of some rows as edges are
+    turned over from odd faces."""
+    reached = np.zeros(len(band.node) + 1, bool)
+    for _ in range(_TURNED):
+        reached[row] = True
+        around = np.concatenate([band.ahead[:, row], band.behind[:, row]], axis=None)
+        row = np.unique(around[~reached[around]])
+    return reached[:-1]
 
 
 def _may_be_covered(band, edge, share, grid):

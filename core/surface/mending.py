@@ -36,6 +36,11 @@ def mend(band: NearBand, edge, crossed, certainty) -> None:
     _shrink_loops(lambda face: number[_around(band, face)], faces, crossed, crossings, certainty, loops)
 
 
+def odd_faces(band: NearBand, edge) -> np.ndarray:
+    """Grid faces, 3 * row of their lowest node in the band + direction across, with an odd number of the edges (e,)."""
+    return np.flatnonzero(np.bincount(_faces(band, edge).reshape(-1)) & 1)
+
+
 def _faces(band, edge):
     """The four grid faces at each edge, 3 * row of their lowest node in the band + direction across, (4,e)."""
     row, axis = np.divmod(edge, 3)
