@@ -87,13 +87,11 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     odd = odd_faces(band, np.append(edge[on], meet.edge[once[meet.crossed[once]]]))
     rest = rest[_beside(band, odd // 3)[edge[rest] // 3]]
     off, there = _covered(rest, edge, share, band, surface, grid, progress.part(0.7, 0.9))
-    on, place = np.append(on, off), np.concatenate([place, there])
-    order = np.argsort(on)
-    on, place = on[order], place[order]
+    on = np.append(on, off)
     progress(0.9)
 
     every = np.append(edge[on], meet.edge[once])
-    place = np.concatenate([place, meet.place[once]])
+    place = np.concatenate([place, there, meet.place[once]])
     normal = np.concatenate([np.zeros((len(on), 3)), meet.normal[once]])
     crossed = np.append(vote[on] > 0, meet.crossed[once])
     mend(band, every, crossed, np.append(np.abs(vote[on]), meet.certainty[once]))

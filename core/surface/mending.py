@@ -66,8 +66,8 @@ def _apart(band, edge):
 
 
 def _shrink_loops(around, faces, crossed, crossings, certainty, loops):
-    """Turn over edges of two odd faces or more until the loop is gone. Edges at a face with three crossings or more may
-    be turned off, others on only, so that no small sheet shrinks.
+    """Turn over edges of two odd faces or more until the loop is gone, none twice for one loop. Edges at a face with
+    three crossings or more may be turned off, others on only, so that no small sheet shrinks.
 
     around : function that gives the edges around faces (f,), (4,f), -1 for those that are not near the surface
     """

@@ -145,7 +145,6 @@ def _sides(a, b, crossed, n, outside, progress):
     kept = a != b
     a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
     degree = np.bincount(np.append(a, b), minlength=n).astype(float)
-    degree[outside] = 0
     free = (a != outside) & (b != outside)
     matrix = diags(degree) - symmetric(weight[free], a[free], b[free], n)
     push = np.bincount((a + b - outside)[~free], weight[~free], n)

@@ -30,7 +30,7 @@ from .sides import patches
 from .spreading import spread_signs
 
 _BEYOND = 3.0  # cells, distance that nodes out of the band count as
-_ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 10, 300, 0.03, 1e-3
+_ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 6, 300, 0.03, 1e-3
 _SWEEPS = 12
 _LEAST = 0.1  # cells, least distance of nodes past a rim from the sheet continued
 _MOST = 0.02  # of the votes, more overruled ones mean that there are no two sides

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
+from core.field.grid import CORNERS, fit_grid
+from core.field.integration import distance_field
+from core.field.local_surface import fit_local_surface
+from core.field.narrow_band import banded_field
 from core.field.steps import NearBand
+from core.points import local_spacing
 from tests import shapes
 from tests.bands import near_band
 
@@ -91,6 +96,49 @@ def test_edges_have_both_ends_in_the_band_and_end_at_the_sides_of_the_box():
         found = band.edges(axis)
         np.testing.assert_array_equal(node[found[0]], low)
         np.testing.assert_array_equal(node[found[1]], high)
+
+
+def random_band(share=0.6, shape=(4, 5, 6)):
+    """A band of some nodes of a small grid, and a table of their rows, -1 for the others, with a layer of -1 around."""
+    node = np.flatnonzero(np.random.default_rng(1).random(shape) < share)
+    table = np.full(np.array(shape) + 2, -1)
+    table[1:-1, 1:-1, 1:-1].flat[node] = 0
+    table[table == 0] = np.arange(len(node))
+    return near_band(shape, node, np.zeros((len(node), 3))), table
+
+
+def test_neighbours_are_those_of_the_grid_and_steps_may_follow_each_other():
+    band, table = random_band()
+    at = np.argwhere(table >= 0)
+    for axis, way in enumerate(np.eye(3, dtype=int)):
+        for found, step in ((band.ahead, way), (band.behind, -way)):
+            np.testing.assert_array_equal(found[axis, :-1], table[tuple((at + step).T)])
+    assert (band.ahead[:, -1] == -1).all()
+    assert (band.behind[:, -1] == -1).all()
+
+
+def test_whole_cells_are_those_with_eight_corners_in_the_band():
+    band, table = random_band(0.85)
+    at = np.argwhere(table >= 0)
+    corner = np.stack([table[tuple((at + step).T)] for step in CORNERS])
+    expected = np.flatnonzero((corner >= 0).all(axis=0))
+    assert 5 < len(expected) < 0.5 * len(at)
+    asked = np.append(np.arange(len(at)), -1)
+    whole, found = band.whole_cells(asked)
+    np.testing.assert_array_equal(whole, expected)
+    np.testing.assert_array_equal(found, corner[:, expected])
+    turned = band.whole_cells(asked[::-1])
+    np.testing.assert_array_equal(asked[::-1][turned[0]], expected[::-1])
+    np.testing.assert_array_equal(turned[1], corner[:, expected[::-1]])
+
+
+def test_nodes_know_their_nearest_sample():
+    points = shapes.sphere(800)
+    surface = fit_local_surface(points, points, np.ones(len(points)), local_spacing(points), 3.0)
+    grid = fit_grid(points, 24)
+    for band in (distance_field(surface, grid)[1], banded_field(surface, grid, 4.0)[1]):
+        away = np.linalg.norm(grid.positions(band.node) - points[band.sample], axis=1)
+        np.testing.assert_allclose(away, surface.tree.query(grid.positions(band.node))[0])
 
 
 def test_positions_away_from_the_band_are_left_out():

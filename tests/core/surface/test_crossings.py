@@ -8,7 +8,7 @@ from core.field.grid import Grid, fit_grid, node_strides
 from core.field.integration import BAND, distance_field
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.crossings import _HAIR, Crossings, _beside, _may_be_covered, find_crossings
+from core.surface.crossings import _HAIR, Crossings, _beside, _in_whole_cells, _may_be_covered, find_crossings
 from tests import shapes
 from tests.bands import near_band
 
@@ -72,6 +72,22 @@ def test_places_lie_on_the_surface_and_on_their_edges(sphere_crossings):
     along = np.take_along_axis(offset, sphere_crossings.axis[:, None], axis=1)
     assert -0.6 < along.min() < along.max() < 1.6
     assert 0.4 < along.mean() < 0.6
+
+
+def test_edges_in_whole_cells_have_four_of_them_around():
+    shape = (5, 6, 7)
+    marked = np.random.default_rng(0).random(shape) < 0.93
+    band = near_band(shape, np.flatnonzero(marked), np.zeros((marked.sum(), 3)))
+    lowest, _ = band.whole_cells(np.arange(len(band.node)))
+    whole = np.zeros(np.array(shape) + 1, bool)
+    whole[1:, 1:, 1:].flat[band.node[lowest]] = True
+    edge = np.arange(3 * len(band.node))
+    expected = []
+    for row, axis in zip(*np.divmod(edge, 3), strict=True):
+        at, sides = np.array(np.unravel_index(band.node[row], shape)) + 1, np.delete(np.eye(3, dtype=int), axis, axis=0)
+        expected.append(all(whole[tuple(at - step @ sides)] for step in ((0, 0), (0, 1), (1, 0), (1, 1))))
+    assert 5 < np.sum(expected) < 0.5 * len(edge)
+    np.testing.assert_array_equal(_in_whole_cells(band, lowest, edge), expected)
 
 
 def test_cells_around_an_edge_share_it():

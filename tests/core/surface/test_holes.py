@@ -6,7 +6,7 @@ import pytest
 from core import Mesh
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.holes import fill_pinholes
+from core.surface.holes import _without_long_loops, fill_pinholes
 from tests import shapes
 
 CELL = 0.05
@@ -59,6 +59,18 @@ def test_pinholes_on_the_surface_close_and_the_rim_stays(plane, holes):
 def test_a_loop_longer_than_64_edges_stays(plane):
     mesh = lattice(block(17, 5))
     assert fill_pinholes(mesh, plane, CELL).border_loops() == 2
+
+
+def ring(count, first=0):
+    return np.stack([np.arange(count), np.roll(np.arange(count), -1)], axis=1) + first
+
+
+def test_of_borders_only_long_loops_that_touch_nothing_are_set_aside():
+    branch = np.array([[300, 500], [500, 501]])
+    path = np.stack([np.arange(600, 700), np.arange(601, 701)], axis=1)
+    kept = [ring(64, 100), ring(100, 300), branch, path]
+    edges = np.concatenate([ring(65), *kept])
+    np.testing.assert_array_equal(_without_long_loops(edges), np.concatenate(kept))
 
 
 def test_an_opening_where_no_surface_is_stays(plane):

@@ -6,7 +6,7 @@ import pytest
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.meeting_edges import _least
-from core.surface.meetings import meetings
+from core.surface.meetings import _goes_past, _linked, meetings
 from core.surface.sheets import sheets_near
 from tests import shapes
 
@@ -42,6 +42,39 @@ def test_one_sheet_meets_none(name):
         ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
         surface = fitted(points, (points - ring) / 0.4)
     assert not meetings(surface).any()
+
+
+def test_samples_are_linked_by_one_that_is_alike_to_both():
+    rng, n, k = np.random.default_rng(0), 60, 6
+    nearest = np.column_stack([np.arange(n), *(rng.permutation(n)[:n] for _ in range(k - 1))])
+    alike, sure = rng.random((n, k)) < 0.4, rng.random(n) < 0.8
+    near = np.zeros((n, n), bool)
+    for i, j in np.argwhere(alike):
+        near[i, nearest[i, j]] |= sure[i] & sure[nearest[i, j]]
+    near |= near.T
+    i, j = rng.integers(0, n, (2, 500))
+    expected = [(near[a] & near[b]).any() for a, b in zip(i, j, strict=True)]
+    assert 0.1 < np.mean(expected) < 0.9
+    np.testing.assert_array_equal(_linked(i, j, nearest, alike, sure), expected)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_sheet_goes_past_another_where_it_has_samples_on_both_sides(turned):
+    """A floor and a wall that ends on it, in either order: one of two is enough."""
+    flat = shapes.square(1200)
+    wall = flat[:, [2, 1, 0]] + np.array([0, 0, 1.02])
+    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
+    surface = fitted(np.concatenate([flat, wall]), normals)
+    if turned:
+        surface = fitted(np.concatenate([wall, flat]), normals[::-1])
+    middle = np.hypot(surface.points[:, 0], surface.points[:, 2]) < 2 * np.median(surface.spacing)
+    near = np.flatnonzero(middle & (np.abs(surface.points[:, 1]) < 0.6))
+    i, j = (each.reshape(-1) for each in np.meshgrid(near, near))
+    close = np.linalg.norm(surface.points[i] - surface.points[j], axis=1) < 2 * np.median(surface.spacing)
+    same = surface.normals[i, 2] == surface.normals[j, 2]
+    found = _goes_past(i, j, surface)
+    assert found[~same & close].mean() > 0.9
+    assert not found[same].any()
 
 
 def test_crossing_squares_meet_along_their_line_only():

@@ -34,6 +34,7 @@ def pick(*places):
         [(4, 4, 5, 2), (5, 5, 5, 2)],  # two that touch
         [(4, 4, 8, 1)],  # a crumb off the sheet
         [(4, 4, 6, 0)],  # a spur on it
+        [(6, 4, 5, 0), (6, 4, 6, 1), (7, 4, 6, 2), (6, 3, 6, 2), (6, 3, 5, 0)],  # a fringe
     ],
 )
 def test_a_damaged_sheet_is_whole_again(damage):

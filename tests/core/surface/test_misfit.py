@@ -33,3 +33,9 @@ def test_agrees_with_exact_distances_to_the_triangles():
 
 def test_no_faces():
     assert misfit(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), np.zeros((1, 3))) == np.inf
+
+
+def test_many_points_count_alike():
+    points = np.random.default_rng(0).uniform([0, 0, 0], [1, 1, 1], (20_000, 3))
+    points = points[np.argsort(points[:, 2])]
+    assert misfit(SQUARE, points) == pytest.approx(points[:, 2].mean(), rel=0.01)

@@ -6,8 +6,9 @@ import pytest
 from core.field.grid import Grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.progress import Progress
 from core.surface.crossings import Crossings
-from core.surface.sides import Sides, find_sides
+from core.surface.sides import Sides, _sides, find_sides
 from tests import shapes
 
 GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
@@ -107,6 +108,23 @@ def test_a_speck_is_no_inside(surface):
     distance = np.abs(RADIUS - 1)
     distance[1:4, 1:4, 1:4] = 0.05
     np.testing.assert_array_equal(find_sides(distance, crossings_of(inside), surface, GRID).inside, RADIUS < 1)
+
+
+def test_sides_are_the_least_frustrated_state():
+    """Against the dense equations; clusters that edges join several times, one of them outside."""
+    rng, n, outside = np.random.default_rng(0), 40, 7
+    a, b = rng.integers(0, n, (2, 300))
+    crossed = rng.random(300) < 0.2
+    matrix = np.zeros((n, n))
+    for i, j, weight in zip(a, b, np.where(crossed, -1.0, 1.0), strict=True):
+        if i != j:
+            matrix[[i, j], [i, j]] += 1
+            matrix[[i, j], [j, i]] -= weight
+    free = np.arange(n) != outside
+    expected = np.ones(n)
+    expected[free] = np.linalg.solve(matrix[free][:, free], -matrix[free, outside])
+    found = _sides(a, b, crossed, n, outside, Progress())
+    np.testing.assert_allclose(found, expected, atol=0.01)
 
 
 def test_signs():

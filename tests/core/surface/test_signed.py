@@ -1,14 +1,19 @@
 """Signed distance of closed shapes against closed forms, and the refusal of others."""
 
+from dataclasses import replace
+
 import igl
 import numpy as np
 import pytest
 
-from core import InputError, Settings, reconstruct
+from core import InputError, Settings, estimate_normals, reconstruct
 from core.field.grid import fit_grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.progress import Progress
+from core.surface.corners import into_corners
 from core.surface.signed import signed_mesh
+from core.surface.zero_set import sharpened
 from tests import shapes
 
 
@@ -183,3 +188,23 @@ def test_creases_are_kept(inward):
     assert off.mean() < 0.15 * run.field.spacing
     assert {shapes.euler(piece) for piece in shapes.components(run.surface)} == {2}
     assert set(run.surface.edge_counts()[1]) == {2}
+
+
+def test_creases_are_sharpened_by_the_faces_beside_them(monkeypatch):
+    points, seen = shapes.cube(2400), []
+    spacing = local_spacing(points)
+    normals, confidence, _ = estimate_normals(points, spacing)
+    surface, grid = fit_local_surface(points, normals, confidence, spacing, 3.0), fit_grid(points, 32)
+    mesh = signed(points, resolution=32).surface
+    blunt = replace(mesh, vertices=mesh.vertices * (1 - 0.3 * grid.spacing * np.abs(mesh.vertices)))
+    found = sharpened(blunt, surface, grid.spacing, Progress())
+
+    def by_all(vertices, faces, *rest):
+        seen.append(len(faces))
+        return into_corners(vertices, blunt.faces, *rest)
+
+    monkeypatch.setattr("core.surface.zero_set.into_corners", by_all)
+    expected = sharpened(blunt, surface, grid.spacing, Progress())
+    assert 0 < max(seen) < 0.5 * len(blunt.faces)
+    assert np.linalg.norm(found.vertices - blunt.vertices, axis=1).max() > 0.1 * grid.spacing
+    np.testing.assert_array_equal(found.vertices, expected.vertices)
