@@ -73,29 +73,22 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     meet = meeting_edges(band, surface, grid, _HAIR * grid.spacing, progress.part(0.0, 0.4))
     progress(0.4)
     lowest, corner = band.whole_cells(np.arange(len(band.node)))
+    once, twice = (each[_in_whole_cells(band, lowest, meet.edge[each])] for each in _once(meet))
     edge, vote, share = _vote(band, corner, grid, progress.part(0.4, 0.5))
-    progress(0.5)
     alone = _may_be_covered(band, edge, share, grid)
     alone[np.isin(edge, meet.zone, kind="table")] = False
     alone = np.flatnonzero(alone)
     alone = alone[_in_whole_cells(band, lowest, edge[alone])]
+
     edge, vote, share = edge[alone], vote[alone], share[alone]
-    once, twice = (each[_in_whole_cells(band, lowest, meet.edge[each])] for each in _once(meet))
-
-    likely, rest = np.flatnonzero(vote > 0), np.flatnonzero(vote <= 0)
-    on, place = _covered(likely, edge, share, band, surface, grid, progress.part(0.5, 0.7))
-    odd = odd_faces(band, np.append(edge[on], meet.edge[once[meet.crossed[once]]]))
-    rest = rest[_beside(band, odd // 3)[edge[rest] // 3]]
-    off, there = _covered(rest, edge, share, band, surface, grid, progress.part(0.7, 0.9))
-    on = np.append(on, off)
-    progress(0.9)
-
+    known = meet.edge[once[meet.crossed[once]]]
+    on, place = _on_surface(edge, vote > 0, share, known, band, surface, grid, progress.part(0.5, 0.9))
     every = np.append(edge[on], meet.edge[once])
-    place = np.concatenate([place, there, meet.place[once]])
-    normal = np.concatenate([np.zeros((len(on), 3)), meet.normal[once]])
     crossed = np.append(vote[on] > 0, meet.crossed[once])
     mend(band, every, crossed, np.append(np.abs(vote[on]), meet.certainty[once]))
     progress(0.98)
+    place = np.concatenate([place, meet.place[once]])
+    normal = np.concatenate([np.zeros((len(on), 3)), meet.normal[once]])
     row, axis = np.divmod(np.append(every[crossed], meet.edge[twice]), 3)
     return Crossings(
         band.node[row],
@@ -106,18 +99,26 @@ def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=N
     )
 
 
-def _covered(chosen, edge, share, band, surface, grid, progress):
-    """Which of the `chosen` (c,) edges the surface reaches, and where it does, for their rows among all (e,)."""
-    row, axis = np.divmod(edge[chosen], 3)
-    place = grid.positions(band.node[row]) + grid.spacing * share[chosen, None] * np.eye(3)[axis]
-    step, _ = first_steps(place, band, surface, grid, progress)
-    on = np.linalg.norm(step, axis=1) <= _COVERED * grid.spacing
-    return chosen[on], place[on] - step[on]
+def _on_surface(edge, likely, share, known, band, surface, grid, progress):
+    """Which of some edges (e,) the surface reaches, (r,), and where, (r,3): of those that it is `likely` (e,) to cross,
+    and of others beside faces that these and the `known` ones leave odd, where edges may yet be turned over."""
+
+    def reached(chosen, part):
+        row, axis = np.divmod(edge[chosen], 3)
+        place = grid.positions(band.node[row]) + grid.spacing * share[chosen, None] * np.eye(3)[axis]
+        step, _ = first_steps(place, band, surface, grid, part)
+        on = np.linalg.norm(step, axis=1) <= _COVERED * grid.spacing
+        return chosen[on], place[on] - step[on]
+
+    on, place = reached(np.flatnonzero(likely), progress.part(0.0, 0.5))
+    odd = odd_faces(band, np.append(edge[on], known))
+    rest = np.flatnonzero(~likely & _beside(band, odd // 3)[edge // 3])
+    more, there = reached(rest, progress.part(0.5, 1.0))
+    return np.append(on, more), np.concatenate([place, there])
 
 
 def _beside(band, row):
-    """Which nodes of the band, (b,) bool, lie up to so many steps along grid edges from those of some rows as edges are
-    turned over from odd faces."""
+    """Nodes of the band, (b,) bool, at most 8 steps along grid edges from those of some rows."""
     reached = np.zeros(len(band.node) + 1, bool)
     for _ in range(_TURNED):
         reached[row] = True
