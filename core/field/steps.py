@@ -14,7 +14,7 @@ _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point 
 
 @dataclass(frozen=True)
 class NearBand:
-    """The nodes within two cells of the surface, called by the rows that they have here.
+    """The nodes within two cells of the surface. They are called by their rows, from 0 to b - 1.
 
     shape    : (nx,ny,nz), nodes of the grid
     node     : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node

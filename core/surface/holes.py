@@ -41,8 +41,8 @@ def fill_pinholes(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
 
 @dataclass(frozen=True)
 class _Borders:
-    """The borders of a mesh: loops of at most 64 edges, and the paths that are left, with the pieces of each between
-    junctions; `edges` (e,2) are all of the mesh and `counts` (e,) the faces of each."""
+    """Borders of a mesh: loops, but for those of rims, the paths that are left, and the pieces of each path between
+    junctions; `edges` (e,2) are all of the mesh, and `counts` (e,) how many faces each has."""
 
     edges: np.ndarray
     counts: np.ndarray

@@ -48,8 +48,13 @@ def _linked(i, j, nearest, alike, sure):
     n, kept = len(nearest), alike & sure[:, None] & sure[nearest]
     first = np.append(0, np.cumsum(kept.sum(axis=1)))
     links = csr_matrix((np.ones(first[-1], np.int8), nearest[kept], first), shape=(n, n))
-    links = links + links.T
-    return np.asarray(links[i].multiply(links[j]).sum(axis=1)).reshape(-1) > 0
+    links, found = links + links.T, np.empty(len(i), bool)
+
+    def look(part):
+        found[part] = np.asarray(links[i[part]].multiply(links[j[part]]).sum(axis=1)).reshape(-1) > 0
+
+    over_rows(look, len(i), _CHUNK)
+    return found
 
 
 def _goes_past(i, j, surface):
