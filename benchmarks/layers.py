@@ -72,7 +72,7 @@ def layers_of(path: Path, sampling: str) -> dict:
     print(path.stem, sampling, flush=True)
     case = load_case(path, sampling)
     apart = _told(case)
-    with patch.object(double_cover, "laid_apart", lambda mesh, cell: centred(mesh)):
+    with patch.object(double_cover, "laid_apart", lambda mesh, *_: centred(mesh)):
         astride = _told(case)
     told = {f"{name}_astride": astride[name] for name in ("crossed", "cd")}
     return {"case": path.stem, "sampling": sampling, **apart, **told, "dense": apart == astride}
