@@ -215,7 +215,11 @@ def _meeting(slot, within, outer, axis):
         np.stack(to_constant(last[lower[below]], outer[1:][below])),
         np.stack(to_constant(first[upper[above]], outer[:-1][above])),
     ]
-    return np.concatenate([np.unique(p[:, (p > 0).all(axis=0)], axis=1) for p in pairs], axis=1)
+    pairs = np.concatenate(pairs, axis=1).astype(np.int64)
+    base = int(pairs.max(initial=0)) + 1
+    keys = np.unique(pairs[0] * base + pairs[1])
+    pairs = np.stack([keys // base, keys % base])
+    return pairs[:, (pairs > 0).all(axis=0)]
 
 
 def _split(node, shape, table):
