@@ -13,9 +13,11 @@ from .evening import evened
 from .first_steps import first_steps
 from .isosurface import isosurface
 from .layers import laid_apart
+from .leaks import shut_leaks
 from .mesh import Mesh
 from .pieces import pieces_with_samples
 from .ridges import raise_ridges
+from .spanning import spanned, spanning_vertices
 from .triangles import mesh_of
 
 CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made background
@@ -58,6 +60,8 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     thousandths of a cell.
 
     Gaps between sheets, and wedges, are open down to little more than two levels, see :mod:`ridges`.
+    Where a closed surface would leak through an opening between samples, this is shut and spanned smoothly, see
+    :mod:`leaks` and :mod:`spanning`.
 
     Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
@@ -66,14 +70,17 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     level = np.float32(level_for(surface, grid, offset) * grid.spacing)
     clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)
     raise_ridges(clamped, band, grid, level)
-    progress(0.0)
+    shut = shut_leaks(clamped, values, surface, grid, level, progress.part(0.0, 0.02))
+    progress(0.02)
     cells, faces = isosurface(clamped, level)
     vertices = grid.origin + grid.spacing * cells
-    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.0, 0.2))
-    side = np.where(past_rim[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
+    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.02, 0.2))
+    loose = spanning_vertices(vertices, step, past_rim, shut, level)
+    side = np.where((past_rim | loose)[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
     vertices = evened(_moved(vertices, step, level), faces, past_rim)
     vertices = _moved(vertices, surface.project(vertices, progress.part(0.3, 0.7)).step, level)
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
+    vertices = spanned(vertices, faces, loose)
     mesh = mesh_of(vertices, faces)
     progress(0.8)
     dense = np.median(surface.spacing) < _DENSE * grid.spacing
