@@ -1,9 +1,9 @@
 """Leaks of closed surfaces: openings between samples that chance has put far apart, by which an iso-surface around the
 surface joins the inside to the outside.
 
-In a leak the distance is hardly more than the level of the iso-surface. So a surface is closed if nearly all samples
-have a region on either side, and these are two, once regions start a little further from the surface; and leaks are
-where such regions meet when they grow down to the level. On both sides of an open surface lies the same region.
+In a leak the distance is hardly more than the level of the iso-surface. So where samples have a region on either side,
+and these are two, as soon as regions start a little further from the surface, this encloses one of them; and leaks are
+where they meet when they grow down to the level. On both sides of an open surface lies the same region.
 """
 
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ from .sides import patches
 _TIMES = 4  # that leaks are looked for: some show when others are shut
 _RAISED = 0.5, 1.0, 2.0, 4.0, 8.0  # cells above the level, where regions are tried
 _COARSE = 1.5  # cells from the surface, beyond which every other node parts regions just as well
-_OPEN = 0.05  # share of the samples with one region on both sides that a closed surface may have
-_MANY = 0.5  # share of the samples between two regions with which no other level is tried
-_SAME = 0.9  # times as many samples between two regions at the level as farther off, if nothing leaks
+_OPEN = 0.05  # share of the samples beside a region that may have it on both sides, if the surface encloses it
+_SAME = 0.9  # times as many samples between two regions as far from the surface, if nothing leaks
+_MANY = 0.5  # share of all samples; the same where the inside does not reach as far
 _SHORT = 0.1  # cells from the edge of a band, where regions may start
 _OFF = 0.7  # cells beyond a level, where samples look for regions
 _OWN = 0.35  # cells, by which the distance may differ there from that to the sample's plane
@@ -51,19 +51,22 @@ def shut_leaks(near, values, surface: LocalSurface, grid: Grid, level: float, pr
     if widest <= level:
         return shut
     far = field.halved().regions(max(widest, _COARSE * grid.spacing))
-    if far.on_one_side > _OPEN * samples:
+    if far.on_one_side > _OPEN * samples > far.between_two:
         return shut
+    enough = _SAME * far.between_two if far.between_two > _OPEN * samples else _MANY * samples
+
+    def apart(found):
+        return found.between_two >= enough and found.on_one_side <= far.on_one_side + _OPEN * samples
+
     levels = [level + raised * grid.spacing for raised in _RAISED]
     levels = [*(raised for raised in levels if raised < widest), widest]
     cut = near.max() if isinstance(near, np.ndarray) else near.outer.max()
     for turn in progress.each(range(_TIMES)):
-        if _Field(near, surface, grid).regions(level).between_two >= max(_SAME * far.between_two, _MANY * samples):
+        if apart(_Field(near, surface, grid).regions(level)):
             break
         field = _Field(each(lambda u, v: np.where(u < cut, u, v), near, values), surface, grid)
-        apart = field.most_parted(progress.part(turn / _TIMES, (turn + 1) / _TIMES).each(levels))
-        if apart.on_one_side > _OPEN * samples:
-            break
-        ends = field.meetings(field.grown(apart, level), apart.level)
+        start = field.first(progress.part(turn / _TIMES, (turn + 1) / _TIMES).each(levels), apart)
+        ends = field.meetings(field.grown(start, level), start.level)
         if not ends.size:
             break
         own = at_nodes(values, ends)
@@ -107,13 +110,17 @@ class _Regions:
         return int(self.both.sum()) - self.between_two
 
     def across(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Whether regions a (m,) and b (m,) are the two sides of some of the surface, (m,) bool."""
+        """Whether regions a (m,) and b (m,) are the two sides of some of the surface, and one of them is enclosed by
+        it, (m,) bool."""
         base = 1 + max(int(names.max(initial=0)) for names in (self.seen, a, b))
+        between, within = (
+            np.bincount(self.seen[rows].reshape(-1), minlength=base) for rows in (self.parted, self.both)
+        )
         pair, times = np.unique(_keys(*self.seen[self.parted].T, base), return_counts=True)
-        total = np.bincount(self.seen[self.parted].reshape(-1), minlength=base)
         row = rows_of(_keys(a, b, base), pair)
         times = np.where(row >= 0, np.append(times, 0)[row], 0)
-        return times > _ACROSS * np.minimum(total[a], total[b])
+        enclosed = between >= (1 - _OPEN) * within
+        return (times > _ACROSS * np.minimum(between[a], between[b])) & (enclosed[a] | enclosed[b])
 
     def of_few_left_out(self) -> "np.ndarray | Blocks":
         """The labels, 0 for regions that hardly a sample sees."""
@@ -146,15 +153,15 @@ class _Field:
         labels, _ = regions(each(lambda u: u > np.float32(level), self.values))
         return _Regions(level, labels, self._seen(labels, level))
 
-    def most_parted(self, levels) -> _Regions:
-        """The regions at the level where most samples lie between two, or at the first where many do."""
-        most = None
+    def first(self, levels, apart) -> _Regions:
+        """The regions at the first level at which they are `apart`, else at that at which most samples lie between
+        two."""
+        found = []
         for level in levels:
-            found = self.regions(level)
-            most = found if most is None or found.between_two > most.between_two else most
-            if most.between_two > _MANY * len(self.surface.points):
-                break
-        return most
+            found.append(self.regions(level))
+            if apart(found[-1]):
+                return found[-1]
+        return max(found, key=lambda regions: regions.between_two)
 
     def grown(self, apart: _Regions, level: float) -> _Regions:
         """The regions grown down to a lower level, over nodes far from the surface first."""

@@ -118,6 +118,28 @@ def test_many_leaks_of_two_shells_are_all_shut():
     assert KDTree(centres).query(places)[0].max() < 0.17 + CELL
 
 
+def test_leaks_of_a_ball_are_shut_above_an_open_ground():
+    ground, ball = [0.0, 0.0, -1.2], 0.7
+    dense = np.concatenate(
+        [outside(ball * shapes.sphere(DENSE), ball * POLE, 0.17), shapes.square(DENSE, 2.2) + ground]
+    )
+    samples = np.concatenate([ball * shapes.sphere(SAMPLES // 2), shapes.square(SAMPLES // 2, 2.2) + ground])
+    normals = np.concatenate([shapes.sphere(SAMPLES // 2), np.tile(POLE, (SAMPLES // 2, 1))])
+    places, near, before = shut(distances(dense), surface_of(samples, normals))
+    assert region_count(before) == 1
+    assert region_count(near) == 2
+    assert np.linalg.norm(places - ball * POLE, axis=1).max() < 0.17 + CELL
+
+
+def test_the_mouth_of_a_vessel_stays_open():
+    """A ball and its mouth, whose samples have the inside on one side and the outside on the other, though these are
+    one: a third of it."""
+    dense, samples = (outside(shapes.sphere(count), POLE, 0.9) for count in (DENSE, SAMPLES))
+    places, near, before = shut(distances(dense), surface_of(samples))
+    assert len(places) == 0
+    np.testing.assert_array_equal(near, before)
+
+
 def test_the_inside_may_be_thinner_than_the_widest_opening():
     """A ring, whose inside is nowhere as far from it as half the bridging length."""
     samples = shapes.torus(500, 0.9, 0.25)
