@@ -21,17 +21,13 @@ from .sides import patches
 _TIMES = 4  # that leaks are looked for: some show when others are shut
 _RAISED = 0.5, 1.0, 2.0, 4.0, 8.0  # cells above the level, where regions are tried
 _COARSE = 1.5  # cells from the surface, beyond which every other node parts regions just as well
-_OPEN = 0.05  # share of the samples beside a region that may have it on both sides, if the surface encloses it
-_SAME = 0.9  # times as many samples between two regions as far from the surface, if nothing leaks
-_MANY = 0.5  # share of all samples; the same where the inside does not reach as far
+_OPEN = 0.05  # share of the samples: as few may have one region on both sides, or lie between two
+_SAME = 0.9  # times as many samples between two regions as farther off, if nothing leaks
 _SHORT = 0.1  # cells from the edge of a band, where regions may start
 _OFF = 0.7  # cells beyond a level, where samples look for regions
-_OWN = 0.35  # cells, by which the distance may differ there from that to the sample's plane
-_FEW = 3  # samples, that a region must be seen by
 _ACROSS = 0.1  # share of what is seen of a region that has another across the surface, if they are its two sides
 _ROUND = 0.5  # cells of distance that regions grow at a time
-_AROUND = 32  # samples, whose median spacing is that of a place
-_BESIDE, _MOST = 8, 0.6  # samples beside a leak, and the share of them that must lie between two regions
+_AROUND, _MOST = 32, 0.6  # samples around a leak, and the share of them that must lie between two regions
 _MARGIN = 2  # cells beyond the level where distances are lowered
 
 
@@ -53,10 +49,10 @@ def shut_leaks(near, values, surface: LocalSurface, grid: Grid, level: float, pr
     far = field.halved().regions(max(widest, _COARSE * grid.spacing))
     if far.on_one_side > _OPEN * samples > far.between_two:
         return shut
-    enough = _SAME * far.between_two if far.between_two > _OPEN * samples else _MANY * samples
 
     def apart(found):
-        return found.between_two >= enough and found.on_one_side <= far.on_one_side + _OPEN * samples
+        more = found.on_one_side - far.on_one_side
+        return found.between_two >= _SAME * far.between_two and more <= _OPEN * samples
 
     levels = [level + raised * grid.spacing for raised in _RAISED]
     levels = [*(raised for raised in levels if raised < widest), widest]
@@ -83,8 +79,7 @@ class _Regions:
 
     level  : float
     labels : (nx,ny,nz) int32 or Blocks, from 1; 0 at other nodes
-    seen   : (n,2) int64, the regions on either side of each sample; 0 where there is none, or another part of the
-             surface is closer
+    seen   : (n,2) int64, the regions on either side of each sample; 0 where there is none
     """
 
     level: float
@@ -110,22 +105,18 @@ class _Regions:
         return int(self.both.sum()) - self.between_two
 
     def across(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Whether regions a (m,) and b (m,) are the two sides of some of the surface, and one of them is enclosed by
-        it, (m,) bool."""
+        """Whether regions a (m,) and b (m,) are the two sides of some of the surface, (m,) bool."""
         base = 1 + max(int(names.max(initial=0)) for names in (self.seen, a, b))
-        between, within = (
-            np.bincount(self.seen[rows].reshape(-1), minlength=base) for rows in (self.parted, self.both)
-        )
+        between = np.bincount(self.seen[self.parted].reshape(-1), minlength=base)
         pair, times = np.unique(_keys(*self.seen[self.parted].T, base), return_counts=True)
         row = rows_of(_keys(a, b, base), pair)
         times = np.where(row >= 0, np.append(times, 0)[row], 0)
-        enclosed = between >= (1 - _OPEN) * within
-        return (times > _ACROSS * np.minimum(between[a], between[b])) & (enclosed[a] | enclosed[b])
+        return times > _ACROSS * np.minimum(between[a], between[b])
 
-    def of_few_left_out(self) -> "np.ndarray | Blocks":
-        """The labels, 0 for regions that hardly a sample sees."""
+    def of_seen(self) -> "np.ndarray | Blocks":
+        """The labels, 0 for regions that no sample sees."""
         times = np.bincount(self.seen.reshape(-1))
-        name = np.where(times >= _FEW, np.arange(len(times)), 0).astype(np.int32)
+        name = np.where(times > 0, np.arange(len(times)), 0).astype(np.int32)
         return each(lambda label: np.where(label < len(name), name.take(label, mode="clip"), 0), self.labels)
 
 
@@ -154,18 +145,16 @@ class _Field:
         return _Regions(level, labels, self._seen(labels, level))
 
     def first(self, levels, apart) -> _Regions:
-        """The regions at the first level at which they are `apart`, else at that at which most samples lie between
-        two."""
-        found = []
+        """The regions at the first level at which they are `apart`, or at the last."""
         for level in levels:
-            found.append(self.regions(level))
-            if apart(found[-1]):
-                return found[-1]
-        return max(found, key=lambda regions: regions.between_two)
+            found = self.regions(level)
+            if apart(found):
+                break
+        return found
 
     def grown(self, apart: _Regions, level: float) -> _Regions:
         """The regions grown down to a lower level, over nodes far from the surface first."""
-        labels, strides = apart.of_few_left_out(), node_strides(self.grid.shape)
+        labels, strides = apart.of_seen(), node_strides(self.grid.shape)
         free = self._nodes(level, np.inf, labels, False)
         away = at_nodes(self.values, free)
         for floor in [*np.arange(apart.level, level, -_ROUND * self.grid.spacing)[1:], level]:
@@ -201,7 +190,6 @@ class _Field:
         tree, k = KDTree(self.surface.points[sample]), range(1, 1 + min(_AROUND, len(sample)))
         around = sample[tree.query(middle, k=k, workers=-1)[1]]
         radius = at_nodes(self.values, ends).max(axis=0) / np.median(self.surface.spacing[around], axis=1)
-        around = around[:, :_BESIDE]
         place = patches(middle, self.grid)
         widest = np.zeros(place.max() + 1)
         np.maximum.at(widest, place, radius)
@@ -223,10 +211,7 @@ class _Field:
             cells = np.rint(cells).astype(np.int64)
             inside = np.flatnonzero(((cells >= 0) & (cells < grid.shape)).all(axis=1))
             node = np.ravel_multi_index(cells[inside].T, grid.shape)
-            height = np.einsum("ni,ni->n", grid.positions(node) - points[inside], normals[inside])
-            height = np.minimum(np.abs(height), self.cut_off)
-            own = np.abs(at_nodes(self.values, node) - height) <= _OWN * grid.spacing
-            seen[inside[own], side] = at_nodes(labels, node[own])
+            seen[inside, side] = at_nodes(labels, node)
         return seen
 
 

@@ -10,7 +10,7 @@ from core.field.blocks import SIDE, blocks_of, put, table_shape
 from core.field.grid import Grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.leaks import shut_leaks
+from core.surface.leaks import _Field, _Regions, shut_leaks
 from tests import shapes
 
 GRID = Grid(np.full(3, -1.43), 0.1, (30, 30, 30))
@@ -64,7 +64,7 @@ def test_an_opening_of_a_ball_is_shut_where_it_is_and_nowhere_else(radius):
     changed = near < before
     assert to_places[changed].max() < LEVEL + 6 * CELL
     np.testing.assert_allclose(near[changed], to_places[changed], rtol=1e-6)
-    within = to_places <= LEVEL
+    within = to_places <= LEVEL + CELL
     np.testing.assert_allclose(near[within], np.minimum(before, to_places)[within], rtol=1e-6)
 
 
@@ -103,6 +103,41 @@ def test_raised_distances_that_leak_are_taken_back():
     assert (near >= before).all()
     assert (near == before)[~raised].all()
     assert (near == before)[raised].any()
+
+
+def test_how_wide_an_opening_is_counts_beside_the_points_around_it():
+    """It is narrower than bridged gaps are elsewhere."""
+    cap = shapes.sphere(4000)
+    cap = cap[cap[:, 2] > 0.75]
+    samples = np.concatenate([outside(shapes.sphere(SAMPLES), POLE, 0.8), cap])
+    values = distances(outside(shapes.sphere(DENSE), POLE, 0.18))
+    assert np.median(local_spacing(samples)) > 1.5 * np.median(local_spacing(cap))
+    assert not len(shut(values, surface_of(samples))[0])
+    assert len(shut(values, surface_of(shapes.sphere(SAMPLES)))[0])
+
+
+def test_a_narrow_neck_between_two_wide_parts_of_one_side_is_no_leak():
+    """A vase, whose belly is apart from the outside once regions start as far off as its neck is wide."""
+
+    def vase(count):
+        ball = outside(0.8 * shapes.sphere(count), 0.8 * POLE, 0.22)
+        neck = shapes.cylinder(count // 4, 0.6) * [0.22, 0.22, 1.0] + [0, 0, 0.7]
+        normals = np.concatenate([ball / 0.8, shapes.cylinder(count // 4, 0.6) * [1, 1, 0]])
+        return np.concatenate([ball - 0.4 * POLE, neck]), normals
+
+    places, near, before = shut(distances(vase(DENSE)[0]), surface_of(*vase(300), bridge=4.0))
+    assert len(places) == 0
+    np.testing.assert_array_equal(near, before)
+
+
+def test_regions_meet_where_the_distance_is_least():
+    """Along a line from one to the other: not midway, but behind the nodes that are farther from the surface."""
+    values = np.zeros((12, 5, 5), np.float32)
+    values[1:11, 2, 2] = [3.0, 1.2, 1.2, 1.9, 1.9, 1.9, 1.9, 1.9, 1.9, 3.0]
+    line = np.ravel_multi_index((np.arange(12), 2, 2), values.shape)
+    field = _Field(values, surface_of(shapes.sphere(30)), Grid(np.zeros(3), 1.0, values.shape))
+    apart = _Regions(2.0, label(values > 2.0)[0].astype(np.int32), np.array([[1, 2]]))
+    np.testing.assert_array_equal(field.grown(apart, 1.0).labels.flat[line], [0, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 0])
 
 
 def test_many_leaks_of_two_shells_are_all_shut():
@@ -174,13 +209,14 @@ def test_no_wall_is_built_where_the_inside_is_narrow():
     assert np.linalg.norm(places - centre, axis=1).max() < 0.24 + CELL
 
 
-def test_blocks_give_the_same_as_the_whole_box():
+@pytest.mark.parametrize("edge", [LEVEL + 2 * CELL, 0.6])
+def test_blocks_give_the_same_as_the_whole_box(edge):
     dense = outside(shapes.sphere(DENSE), POLE, 0.18)
     values, surface = distances(dense), surface_of(shapes.sphere(SAMPLES))
     places, near, _ = shut(values, surface)
-    band = np.minimum(values, np.float32(0.6))
-    block = np.unique(_block_of(np.flatnonzero(band < 0.6)))
-    stored = blocks_of(GRID.shape, block, np.float32(0.6))
+    band = np.minimum(values, np.float32(edge))
+    block = np.unique(_block_of(np.flatnonzero(band < np.float32(edge))))
+    stored = blocks_of(GRID.shape, block, np.float32(edge))
     inside = stored.nodes(stored.inside())
     put(stored, inside, band.reshape(-1)[inside])
     cut = stored.map(lambda u: np.minimum(u, np.float32(LEVEL + 2 * CELL)))
@@ -194,12 +230,23 @@ def _block_of(node):
     return np.ravel_multi_index(tuple(at), table_shape(GRID.shape))
 
 
-def test_what_a_run_leaves_open_by_chance_it_shuts():
-    """Random samples on a ball leave openings that bridging does not close; a square cut out of them stays open."""
+@pytest.mark.parametrize("seed", range(4))
+def test_runs_give_closed_covers_of_cubes_of_random_points(seed):
+    """Without this each of the last three has from two to four tunnels."""
+    rng = np.random.default_rng(seed)
+    side, points = rng.integers(0, 6, 600), rng.uniform(-1, 1, (600, 3))
+    points[np.arange(600), side % 3] = np.where(side < 3, 1, -1)
+    cover = reconstruct(points, Settings(resolution=64)).surface
+    assert len(shapes.components(cover)) == 2
+    assert shapes.euler(cover) == 4
+
+
+def test_a_run_spans_what_it_shuts_smoothly_and_leaves_wide_openings():
+    """Folded onto its rim the opening would be .024 off."""
     points = shapes.scattered_sphere(600, seed=1)
     cover = reconstruct(points, Settings(resolution=64)).surface
     assert len(shapes.components(cover)) == 2
     assert shapes.euler(cover) == 4
-    assert np.abs(np.linalg.norm(cover.vertices, axis=1) - 1).max() < 0.1
+    assert np.abs(np.linalg.norm(cover.vertices, axis=1) - 1).max() < 0.015
     open_cover = reconstruct(outside(points, POLE, 0.6), Settings(resolution=64)).surface
     assert len(shapes.components(open_cover)) == 1

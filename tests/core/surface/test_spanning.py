@@ -34,14 +34,16 @@ def test_what_nothing_holds_stays_and_so_does_all_without_openings():
     plane = np.column_stack([AT, np.zeros(len(AT))])
     np.testing.assert_array_equal(spanned(plane, QUADS, np.zeros(len(AT), bool)), plane)
     bent = plane + [[0.0, 0.0, 1.0]] * AT[:, :1] ** 2
-    assert np.isfinite(spanned(bent, QUADS, np.ones(len(AT), bool))).all()
+    found = spanned(bent, QUADS, np.ones(len(AT), bool))
+    np.testing.assert_allclose(found.mean(axis=0), bent.mean(axis=0), atol=1e-6)
+    assert np.abs(found).max() < 1.2
 
 
 def test_vertices_closer_to_openings_than_to_the_surface_span_them_and_rims_beside():
     x = shapes.sphere(2000)
     places, radius, level = np.array([[0.0, 0.0, 1.0], [0.1, 0.0, 1.0]]), np.linspace(0, 1, 2000), 0.15
     turned = np.random.default_rng(0).permutation(2000)
-    step, past_rim = x[turned] * radius[turned, None], radius[turned] > 0.4
+    step, past_rim = x[turned] * radius[turned, None], np.arange(2000) % 3 == 0
     away = np.linalg.norm(x[:, None] - places, axis=2).min(axis=1)
     found = spanning_vertices(x, step, past_rim, places, level)
     np.testing.assert_array_equal(found, (away < radius[turned]) | (past_rim & (away < 0.3)))
