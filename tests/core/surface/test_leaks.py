@@ -140,6 +140,15 @@ def test_regions_meet_where_the_distance_is_least():
     np.testing.assert_array_equal(field.grown(apart, 1.0).labels.flat[line], [0, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 0])
 
 
+def test_regions_that_no_sample_sees_do_not_stand_between_others():
+    values = np.zeros((9, 5, 5), np.float32)
+    values[1:8, 2, 2] = [3.0, 1.2, 1.2, 2.5, 1.2, 1.2, 3.0]
+    line = np.ravel_multi_index((np.arange(9), 2, 2), values.shape)
+    field = _Field(values, surface_of(shapes.sphere(30)), Grid(np.zeros(3), 1.0, values.shape))
+    apart = _Regions(2.0, label(values > 2.0)[0].astype(np.int32), np.array([[1, 3]]))
+    assert set(field.grown(apart, 1.0).labels.flat[line]) == {0, 1, 3}
+
+
 def test_many_leaks_of_two_shells_are_all_shut():
     """The void within, the wall, the outside: three regions."""
     centres = np.concatenate([shapes.sphere(9), 0.5 * shapes.sphere(3)])
