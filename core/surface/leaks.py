@@ -16,6 +16,7 @@ from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..lookup import rows_of
 from ..progress import Progress
+from .fillings import edge_keys
 from .sides import patches
 
 _TIMES = 4  # that leaks are looked for: some show when others are shut
@@ -104,14 +105,13 @@ class _Regions:
     def on_one_side(self) -> int:
         return int(self.both.sum()) - self.between_two
 
-    def across(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Whether regions a (m,) and b (m,) are the two sides of some of the surface, (m,) bool."""
-        base = 1 + max(int(names.max(initial=0)) for names in (self.seen, a, b))
-        between = np.bincount(self.seen[self.parted].reshape(-1), minlength=base)
-        pair, times = np.unique(_keys(*self.seen[self.parted].T, base), return_counts=True)
-        row = rows_of(_keys(a, b, base), pair)
-        times = np.where(row >= 0, np.append(times, 0)[row], 0)
-        return times > _ACROSS * np.minimum(between[a], between[b])
+    def across(self, pairs: np.ndarray) -> np.ndarray:
+        """Whether pairs of regions (m,2) are the two sides of some of the surface, (m,) bool."""
+        base, sides = 1 + max(int(names.max(initial=0)) for names in (self.seen, pairs)), self.seen[self.parted]
+        between = np.bincount(sides.reshape(-1), minlength=base)
+        known, times = np.unique(edge_keys(sides, base), return_counts=True)
+        times = np.append(times, 0)[rows_of(edge_keys(pairs, base), known)]
+        return times > _ACROSS * between[pairs].min(axis=1)
 
     def of_seen(self) -> "np.ndarray | Blocks":
         """The labels, 0 for regions that no sample sees."""
@@ -182,7 +182,7 @@ class _Field:
             meet = node[(there > 0) & (there != here)]
             ends.append(np.stack([meet, meet + stride]))
         ends = np.concatenate(ends, axis=1)
-        ends = ends[:, grown.across(*at_nodes(grown.labels, ends))]
+        ends = ends[:, grown.across(at_nodes(grown.labels, ends).T)]
         if not ends.size:
             return ends
         middle = _middle(ends, self.grid)
@@ -218,11 +218,6 @@ class _Field:
 def _middle(ends, grid):
     """Middles (m,3) of edges between nodes (2,m)."""
     return 0.5 * sum(grid.positions(end) for end in ends)
-
-
-def _keys(a, b, base):
-    """One number for each pair of numbers below `base`, in either order."""
-    return np.minimum(a, b).astype(np.int64) * base + np.maximum(a, b)
 
 
 def _lower(near, places, grid, level):
