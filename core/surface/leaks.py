@@ -17,7 +17,7 @@ from ..field.local_surface import LocalSurface
 from ..lookup import rows_of
 from ..progress import Progress
 from .fillings import edge_keys
-from .sides import patches
+from .sides import patches, regions_beside
 
 _TIMES = 4  # that leaks are looked for: some show when others are shut
 _RAISED = 0.5, 1.0, 2.0, 4.0, 8.0  # cells above the level, where regions are tried
@@ -25,7 +25,6 @@ _COARSE = 1.5  # cells from the surface, beyond which every other node parts reg
 _OPEN = 0.05  # share of the samples: as few may have one region on both sides, or lie between two
 _SAME = 0.9  # times as many samples between two regions as farther off, if nothing leaks
 _SHORT = 0.1  # cells from the edge of a band, where regions may start
-_OFF = 0.7  # cells beyond a level, where samples look for regions
 _ACROSS = 0.1  # share of what is seen of a region that has another across the surface, if they are its two sides
 _ROUND = 0.5  # cells of distance that regions grow at a time
 _AROUND, _MOST = 32, 0.6  # samples around a leak, and the share of them that must lie between two regions
@@ -142,7 +141,7 @@ class _Field:
 
     def regions(self, level: float) -> _Regions:
         labels, _ = regions(each(lambda u: u > np.float32(level), self.values))
-        return _Regions(level, labels, self._seen(labels, level))
+        return _Regions(level, labels, regions_beside(labels, self.surface, level, self.grid))
 
     def first(self, levels, apart) -> _Regions:
         """The regions at the first level at which they are `apart`, or at the last."""
@@ -169,7 +168,7 @@ class _Field:
                 now = now[found == 0]
             left = at_nodes(labels, free) == 0
             free, away = free[left], away[left]
-        return _Regions(level, labels, self._seen(labels, level))
+        return _Regions(level, labels, regions_beside(labels, self.surface, level, self.grid))
 
     def meetings(self, grown: _Regions, farthest: float) -> np.ndarray:
         """Edges of the grid by which regions that are the two sides of the surface meet, up to `farthest` from it: flat
@@ -202,17 +201,6 @@ class _Field:
         low, high = np.float32(low), np.float32(high)
         chosen = each(lambda u, label: (u > low) & (u <= high) & ((label > 0) == labelled), self.values, labels)
         return marked_nodes(each(np.logical_and, chosen, inner_nodes(chosen)))
-
-    def _seen(self, labels, level):
-        points, normals, grid = self.surface.points, self.surface.normals, self.grid
-        seen = np.zeros((len(points), 2), np.int64)
-        for side, sign in enumerate((-1, 1)):
-            cells = (points + sign * (level + _OFF * grid.spacing) * normals - grid.origin) / grid.spacing
-            cells = np.rint(cells).astype(np.int64)
-            inside = np.flatnonzero(((cells >= 0) & (cells < grid.shape)).all(axis=1))
-            node = np.ravel_multi_index(cells[inside].T, grid.shape)
-            seen[inside, side] = at_nodes(labels, node)
-        return seen
 
 
 def _middle(ends, grid):

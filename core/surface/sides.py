@@ -7,7 +7,8 @@ the label spreads over the grid, where each node decides with all its neighbours
 Nodes far from the surface fall into regions, of which the one at the box is outside. Between them, the side s of each
 node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the surface and of (s_a + s_b)^2 over those
 that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Nested shells so get alternating
-sides: a hollow ball is inside between its walls, and outside within.
+sides: a hollow ball is inside between its walls, and outside within. Where the outside lies on both sides of most
+samples, as around an open sheet, no side need be asked: nothing is inside.
 """
 
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ from .crossings import Crossings
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
+_OFF = 0.7  # cells beyond the distance where regions start, at which samples look for them
+_OUTSIDE = 0.5  # share of the samples with the outside on both sides, above which nothing is inside
 _SPECK = 27  # nodes
 _TOLERANCE, _STEPS = 1e-3, 1000
 _ADJACENT = 1.8  # cells, edges of one patch
@@ -90,29 +93,42 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32, or Blocks of a band wider than
     :func:`needed_band`, and the crossed grid edges.
 
-    Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges.
+    Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges. Of a surface with the
+    outside on both sides of most samples every crossing has one side at both ends.
     """
     progress = Progress.of(progress)
-    limit = np.float32(_far(surface, grid) * grid.spacing)
-    near = each(lambda u, inner: inner & (u <= limit), values, inner_nodes(values))
+    limit = _far(surface, grid) * grid.spacing
+    near = each(lambda u, inner: inner & (u <= np.float32(limit)), values, inner_nodes(values))
     labels, count = regions(each(np.logical_not, near))
-    outside = int(at_nodes(labels, np.array([0]))[0]) - 1
+    outside = int(at_nodes(labels, np.array([0]))[0])
+    if (regions_beside(labels, surface, limit, grid) == outside).all(axis=1).mean() > _OUTSIDE:
+        inside = each(np.zeros_like, near)
+        low, axis = np.divmod(crossings.changing_sides, 3)
+        return _judged(inside, low, low + node_strides(grid.shape)[axis], np.ones(len(low), bool), grid)
     node = marked_nodes(near)
     cluster = each(lambda label: label.astype(np.int32) - 1, labels)
     put(cluster, node, count + np.arange(len(node)))
     progress(0.1)
     a, b, crossed = _edges_of(node, near, crossings, grid)
     progress(0.2)
-    side = _sides(at_nodes(cluster, a), at_nodes(cluster, b), crossed, count + len(node), outside, progress) < 0
+    side = _sides(at_nodes(cluster, a), at_nodes(cluster, b), crossed, count + len(node), outside - 1, progress) < 0
     progress(0.7)
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster))
-
     progress(0.9)
-    inside_a = at_nodes(inside, a)
-    differ = inside_a != at_nodes(inside, b)
-    alike, spanned = crossed & ~differ, ~crossed & differ
-    same, gaps = (0.5 * (grid.positions(a[chosen]) + grid.positions(b[chosen])) for chosen in (alike, spanned))
-    return Sides(inside, same, inside_a[alike], gaps, int(crossed.sum()), grid)
+    return _judged(inside, a, b, crossed, grid)
+
+
+def regions_beside(labels, surface: LocalSurface, level: float, grid: Grid) -> np.ndarray:
+    """The regions on either side of each sample, (n,2) int64, from the `labels` (nx,ny,nz) or Blocks of the nodes that
+    are farther than a `level` from the surface; 0 where there is none."""
+    points, normals = surface.points, surface.normals
+    beside = np.zeros((len(points), 2), np.int64)
+    for side, sign in enumerate((-1, 1)):
+        cells = (points + sign * (level + _OFF * grid.spacing) * normals - grid.origin) / grid.spacing
+        cells = np.rint(cells).astype(np.int64)
+        inside = np.flatnonzero(((cells >= 0) & (cells < grid.shape)).all(axis=1))
+        beside[inside, side] = at_nodes(labels, np.ravel_multi_index(cells[inside].T, grid.shape))
+    return beside
 
 
 def needed_band(surface: LocalSurface, grid: Grid) -> float:
@@ -124,6 +140,15 @@ def _far(surface, grid):
     """Cells from the surface where regions start."""
     far = 0.5 * surface.bridge * float(np.median(surface.spacing)) / grid.spacing
     return float(np.clip(far, _NEAREST, _FARTHEST))
+
+
+def _judged(inside, a, b, crossed, grid):
+    """The sides, with the edges (a, b) that contradict them, (e,) each, of which some are `crossed`."""
+    inside_a = at_nodes(inside, a)
+    differ = inside_a != at_nodes(inside, b)
+    alike, spanned = crossed & ~differ, ~crossed & differ
+    same, gaps = (0.5 * (grid.positions(a[chosen]) + grid.positions(b[chosen])) for chosen in (alike, spanned))
+    return Sides(inside, same, inside_a[alike], gaps, int(crossed.sum()), grid)
 
 
 def _edges_of(node, near, crossings, grid):

@@ -101,6 +101,35 @@ def test_an_inner_wall_has_the_inside_on_both_faces(surface):
     assert sides.share > 0.05
 
 
+@pytest.mark.parametrize(("share", "inside_found"), [(0.0, True), (0.4, True), (0.6, False), (1.0, False)])
+def test_with_the_outside_on_both_sides_of_most_samples_nothing_is_inside(share, inside_found):
+    """A ball of radius 1/2 below an open square: that share of the samples is the square's."""
+    count = int(share * 1000)
+    height = GRID.positions(np.arange(29**3)).reshape(*GRID.shape, 3) - [0, 0, 0.96]
+    ball = np.linalg.norm(height - [0, 0, -1.46], axis=-1)
+    square = np.linalg.norm(np.maximum(np.abs(height) - [0.8, 0.8, 0], 0), axis=-1)
+    flat = np.arange(29**3).reshape(GRID.shape)
+    above = flat[(np.abs(height[..., :2]) < 0.8).all(axis=-1) & (height[..., 2] < 0) & (height[..., 2] > -0.1)]
+    around = crossings_of(ball < 0.5)
+    both = Crossings(
+        np.append(around.node, above),
+        np.append(around.axis, np.full(len(above), 2)),
+        np.zeros((len(around.node) + len(above), 3)),
+        around.cells,
+        np.zeros((len(around.node) + len(above), 3)),
+    )
+    place = np.random.default_rng(0).uniform([-0.8, -0.8, 0.96], [0.8, 0.8, 0.96], (count, 3))
+    out = shapes.sphere(1000 - count)
+    normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (count, 1)), out])
+    points = np.concatenate([place, [0, 0, -0.5] + 0.5 * out])
+    surface = fit_local_surface(points, normals, np.ones(1000), np.full(1000, 0.06), 3.0)
+    sides = find_sides(np.minimum(np.abs(ball - 0.5), square), both, surface, GRID)
+    np.testing.assert_array_equal(sides.inside, (ball < 0.5) & inside_found)
+    assert sides.share == pytest.approx(len(above) / len(both.node) if inside_found else 1.0)
+    assert not sides.within.any()
+    assert sides.spanned == 0
+
+
 def test_a_speck_is_no_inside(surface):
     """Crossings around a single node that is far from everything else."""
     inside = RADIUS < 1
