@@ -4,13 +4,13 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from itertools import islice
+from itertools import chain, islice
 
 from .progress import Progress
 
 _AHEAD = 2  # chunks in work or waiting for it, per core
 _HELD = 16  # chunks begun and not yet handed on, per core: those behind a large one go on meanwhile
-_FEW = 512  # rows, hardly worth a thread
+_FEW = 2048  # rows, hardly worth a thread: fewer wait for the interpreter more often than they work
 _MOST_CORES = 8  # more hardly gain, and each holds chunks in memory
 
 
@@ -20,7 +20,12 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
     Threads serve, since NumPy and SciPy let go of the interpreter in their loops. What an iterator of `chunks` does
     (report progress, cancel) happens in the caller's thread; when it raises, no thread is left.
     """
-    at_once, chunks, begun = cores(), iter(chunks), deque()
+    chunks = iter(chunks)
+    ahead = list(islice(chunks, 2))
+    if len(ahead) < 2:
+        yield from ((chunk, work(chunk)) for chunk in ahead)
+        return
+    at_once, chunks, begun = cores(), chain(ahead, chunks), deque()
     with ThreadPoolExecutor(at_once) as pool:
         try:
             while True:

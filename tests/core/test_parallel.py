@@ -19,6 +19,16 @@ def test_results_come_in_the_order_of_the_chunks():
     assert list(in_order(str, [])) == []
 
 
+def test_one_chunk_is_worked_on_in_the_thread_of_the_caller():
+    here = threading.current_thread()
+
+    def threads(chunks):
+        return [thread for _, thread in in_order(lambda _: threading.current_thread(), chunks)]
+
+    assert threads([0]) == [here]
+    assert here not in threads([0, 1])
+
+
 @pytest.mark.parametrize("count", [0, 1, _FEW, 10 * _FEW + 7])
 def test_every_row_is_worked_on_once(count):
     times = np.zeros(count, int)
