@@ -1,8 +1,8 @@
 """Concave corners: between sheets that meet, faces lead from one sheet straight to the other."""
 
-from itertools import pairwise
-
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
@@ -62,28 +62,46 @@ def _to_meetings(place, side, corner, other, surface, cell, progress):
 
     corner, other : (c,) int, the ends of each edge, once either way
 
-    Sheets bend on the way, so planes are laid again at the feet of places part of the way there and a little off the
-    sheet, while these are on the same sheet. The meeting of those counts where that of the first is off the surface and
-    theirs is closer.
+    Sheets bend on the way, so where planes meet off the surface they are laid again further on, and their meeting
+    counts if it is closer.
     """
-    progress, both, planes = Progress.of(progress), np.append(corner, corner), np.append(corner, other)
-    ends = np.linspace(0, 1, _ADVANCES + 3)
-    first, *between, last = (progress.part(*part) for part in pairwise(ends))
-    step = to_planes(place, both, place[planes], side[planes], _STIFFNESS)
-    found = surface.project(place + step, first)
+    progress = Progress.of(progress)
+    step = _onto_planes(place, place, side, corner, other)
+    found = surface.project(place + step, progress.part(0.0, 0.2))
+    onto, off = found.step, found.distance
+    part = connected_components(coo_matrix((np.ones(len(corner)), (corner, other)), shape=(len(off),) * 2))[1]
+    row = np.flatnonzero(np.isin(part, part[off > _MET * cell]))
+    if len(row):
+        number = np.full(len(off), -1)
+        number[row] = np.arange(len(row))
+        ends = number[[end[number[corner] >= 0] for end in (corner, other)]]
+        further = _laid_again(place[row], side[row], step[row], *ends, surface, cell, progress.part(0.2, 0.8))
+        there = surface.project(place[row] + further, progress.part(0.8, 1.0))
+        better = (off[row] > _MET * cell) & (there.distance < off[row])
+        row = row[better]
+        step[row], onto[row], off[row] = further[better], there.step[better], there.distance[better]
+    return np.where((off > _OFF * cell)[:, None], step - onto, step), off
+
+
+def _laid_again(place, side, step, corner, other, surface, cell, progress):
+    """The same steps (v,3) by planes at the feet of places part of the way there and a little off the sheet, while
+    these are on the same sheet."""
     at, normal, further, share = place, side, step, np.full((len(place), 1), _ADVANCE)
-    for part in between:
+    for turn in range(_ADVANCES):
         x = at + share * (place + further - at) + _LIFT * cell * normal
-        near = surface.project(x, part)
+        near = surface.project(x, progress.part(turn / _ADVANCES, (turn + 1) / _ADVANCES))
         fresh = near.direction
         same = ((np.einsum("vi,vi->v", fresh, normal) > _SAME) & ~near.past_rim)[:, None]
         at, normal, share = np.where(same, x - near.step, at), np.where(same, fresh, normal), share * (1 - 0.5 * ~same)
-        further = to_planes(place, both, at[planes], normal[planes], _STIFFNESS)
-    there = surface.project(place + further, last)
-    better = (found.distance > _MET * cell) & (there.distance < found.distance)
-    step, onto = (np.where(better[:, None], *pair) for pair in ((further, step), (there.step, found.step)))
-    off = np.where(better, there.distance, found.distance)
-    return np.where((off > _OFF * cell)[:, None], step - onto, step), off
+        further = _onto_planes(place, at, normal, corner, other)
+    return further
+
+
+def _onto_planes(place, at, normal, corner, other):
+    """Steps (v,3) from places (v,3) to where their planes, through places `at` (v,3) with normals (v,3), and those at
+    the other ends of their edges meet."""
+    planes = np.append(corner, other)
+    return to_planes(place, np.append(corner, corner), at[planes], normal[planes], _STIFFNESS)
 
 
 def _closest_ends(low, high, length):
