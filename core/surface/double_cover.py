@@ -13,9 +13,10 @@ from .evening import evened
 from .first_steps import first_steps
 from .isosurface import isosurface
 from .layers import laid_apart
-from .leaks import shut_leaks
+from .leaks import lower_around, shut_leaks
 from .mesh import Mesh
 from .pieces import pieces_with_samples
+from .pinholes import find_pinholes
 from .ridges import raise_ridges
 from .spanning import spanned, spanning_vertices
 from .triangles import mesh_of
@@ -60,8 +61,8 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     thousandths of a cell.
 
     Gaps between sheets, and wedges, are open down to little more than two levels, see :mod:`ridges`.
-    Where a closed surface would leak through an opening between samples, this is shut and spanned smoothly, see
-    :mod:`leaks` and :mod:`spanning`.
+    Where a closed surface would leak through an opening between samples, or an open sheet has a pinhole, this is shut
+    and spanned smoothly, see :mod:`leaks`, :mod:`pinholes` and :mod:`spanning`.
 
     Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
@@ -72,9 +73,14 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     raise_ridges(clamped, band, grid, level)
     shut = shut_leaks(clamped, values, surface, grid, level, progress.part(0.0, 0.02))
     progress(0.02)
-    cells, faces = isosurface(clamped, level)
-    vertices = grid.origin + grid.spacing * cells
-    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.02, 0.2))
+    vertices, faces = _extracted(clamped, level, grid)
+    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.02, 0.15))
+    places = find_pinholes(vertices, faces, step, past_rim, surface, grid)
+    if len(places):
+        lower_around(places, clamped, grid, level)
+        shut = np.concatenate([shut, places])
+        vertices, faces = _extracted(clamped, level, grid)
+        step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.15, 0.3))
     loose = spanning_vertices(vertices, step, past_rim, shut, level)
     side = np.where((past_rim | loose)[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
     vertices = evened(_moved(vertices, step, level), faces, past_rim)
@@ -87,6 +93,11 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
+
+
+def _extracted(values, level, grid):
+    cells, faces = isosurface(values, level)
+    return grid.origin + grid.spacing * cells, faces
 
 
 def _moved(vertices, step, level):

@@ -68,7 +68,7 @@ def shut_leaks(near, values, surface: LocalSurface, grid: Grid, level: float, pr
         own = at_nodes(values, ends)
         put(near, ends, np.minimum(at_nodes(near, ends), own))
         places = _middle(ends[:, (own > level).all(axis=0)], grid)
-        _lower(near, places, grid, level)
+        lower_around(places, near, grid, level)
         shut = np.concatenate([shut, places])
     return shut
 
@@ -208,8 +208,9 @@ def _middle(ends, grid):
     return 0.5 * sum(grid.positions(end) for end in ends)
 
 
-def _lower(near, places, grid, level):
-    """Lower distances, in place, to those to the places (m,3)."""
+def lower_around(places: np.ndarray, near: np.ndarray | Blocks, grid: Grid, level: float) -> None:
+    """Lower distances `near`, (nx,ny,nz) float32 or Blocks, in place, to those to the places (m,3), up to two cells
+    beyond a level, float."""
     if not len(places):
         return
     reach = int(np.ceil(level / grid.spacing)) + _MARGIN

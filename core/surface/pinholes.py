@@ -1,0 +1,93 @@
+"""Pinholes of open sheets: openings between samples that chance has put far apart, where an iso-surface passes from one
+side of the sheet to the other.
+
+It does so at every rim. The faces that turn from one side to the other form loops there: around the whole sheet, and
+one in each pinhole, which has more of the iso-surface on either side than it could go around on a flat sheet. Other
+short loops go around specks, where creases are seen from either side, for instance.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ..field.grid import Grid
+from ..field.local_surface import LocalSurface
+from ..linalg import dots, row_dots
+from ..lookup import numbered
+from .mesh import at_corners
+
+_LONGEST = 64  # faces of a loop; longer ones go around sheets and wide holes
+_AROUND = 32  # samples, whose median spacing is that of a place
+_APART = 0.5  # cells between the places that fill an opening
+
+
+def find_pinholes(vertices, faces, step, past_rim, surface: LocalSurface, grid: Grid) -> np.ndarray:
+    """Places in the pinholes of an iso-surface that are no wider than the bridging length, (m,3) float64, half a cell
+    apart.
+
+    vertices, faces : (v,3) and triangles or quads (f,k)     step : (v,3), from the foot points to the vertices
+    past_rim        : (v,) bool, whether these lie on rims
+    """
+    nowhere = np.empty((0, 3))
+    if not past_rim.any():
+        return nowhere
+    turning = _turning(faces, _facing(vertices, step, past_rim, surface))
+    loops = [(loop, _across(vertices[faces[loop]].mean(axis=1), grid.spacing)) for loop in _loops(faces, turning)]
+    loops = [(loop, places) for loop, places in loops if _is_narrow(places, surface)]
+    if not loops:
+        return nowhere
+    graph = coo_matrix(
+        (np.ones(turning.size - turning.sum(), bool), _ends(faces, ~turning)), shape=(len(vertices),) * 2
+    )
+    part = connected_components(graph, directed=False)[1]
+    size = np.bincount(part)[part]
+    beside = [size[np.stack(_ends(faces[loop], turning[loop]))].min() for loop, _ in loops]
+    kept = [each for (loop, each), least in zip(loops, beside, strict=True) if least > len(loop) ** 2]
+    return np.concatenate([nowhere, *kept])
+
+
+def _facing(vertices, step, past_rim, surface):
+    """Directions (v,3) to the side of the sheet that vertices are on; past rims, by the normals of samples."""
+    facing, past = step.copy(), np.flatnonzero(past_rim)
+    normal = surface.normals[surface.tree.query(vertices[past], workers=-1)[1]]
+    facing[past] = np.where(row_dots(step[past], normal) < 0, -1.0, 1.0)[:, None] * normal
+    return facing
+
+
+def _turning(faces, facing):
+    """Which sides of faces (f,k), from each corner to the next, turn to the other side of the sheet, (f,k) bool."""
+    corners = at_corners(facing, faces)
+    return np.stack([dots(*pair) < 0 for pair in zip(corners, [*corners[1:], corners[0]], strict=True)], axis=1)
+
+
+def _ends(faces, chosen):
+    """The vertices at the ends of the sides of faces (f,k) that are chosen, (f,k) bool: two arrays (s,)."""
+    return faces[chosen], np.roll(faces, -1, axis=1)[chosen]
+
+
+def _loops(faces, turning):
+    """Short closed loops of faces that turn from side to side, each across the next: arrays of their rows."""
+    row = np.flatnonzero(turning.any(axis=1))
+    low, high = np.sort(_ends(faces[row], turning[row]), axis=0).astype(np.int64)
+    edge, number = numbered(low * (1 + high.max(initial=0)) + high)
+    times = turning[row].sum(axis=1)
+    owner = np.repeat(np.arange(len(row)), times)
+    graph = coo_matrix((np.ones(len(owner), bool), (owner, len(row) + number)), shape=(len(row) + len(edge),) * 2)
+    part = connected_components(graph, directed=False)[1][: len(row)]
+    closed = (np.bincount(part, times % 2) == 0) & (np.bincount(part) <= _LONGEST)
+    return [row[part == number] for number in np.flatnonzero(closed)]
+
+
+def _across(loop, cell):
+    """Places (m,3) on the lines from the middle of a loop of places (l,3) to these."""
+    middle = loop.mean(axis=0)
+    count = 1 + int(np.ceil(np.linalg.norm(loop - middle, axis=1).max() / (_APART * cell)))
+    share = np.linspace(0, 1, count)[:, None, None]
+    return (middle + share * (loop - middle)).reshape(-1, 3)
+
+
+def _is_narrow(places, surface):
+    """Whether an opening filled with places (m,3) is no wider than the bridging length."""
+    around = surface.tree.query(places[0], k=min(_AROUND, surface.tree.n))[1]
+    widest = 0.5 * surface.bridge * np.median(surface.spacing[around])
+    return surface.project(places).distance.max() <= widest
