@@ -18,6 +18,7 @@ from .mesh import at_corners
 
 _LONGEST = 64  # faces of a loop; longer ones go around sheets and wide holes
 _AROUND = 32  # samples, whose median spacing is that of a place
+_LEVEL = 0.5  # least mean cosine between their normals and that of an opening in their sheet
 _APART = 0.5  # cells between the places that fill an opening
 
 
@@ -33,7 +34,7 @@ def find_pinholes(vertices, faces, step, past_rim, surface: LocalSurface, grid: 
         return nowhere
     turning = _turning(faces, _facing(vertices, step, past_rim, surface))
     loops = [(loop, _across(vertices[faces[loop]].mean(axis=1), grid.spacing)) for loop in _loops(faces, turning)]
-    loops = [(loop, places) for loop, places in loops if _is_narrow(places, surface)]
+    loops = [(loop, places) for loop, places in loops if _is_bridged(places, surface)]
     if not loops:
         return nowhere
     graph = coo_matrix(
@@ -86,8 +87,12 @@ def _across(loop, cell):
     return (middle + share * (loop - middle)).reshape(-1, 3)
 
 
-def _is_narrow(places, surface):
-    """Whether an opening filled with places (m,3) is no wider than the bridging length."""
+def _is_bridged(places, surface):
+    """Whether an opening filled with places (m,3) goes on with the sheet around it, as the mouth of a tube does not,
+    and is no wider than the bridging length."""
     around = surface.tree.query(places[0], k=min(_AROUND, surface.tree.n))[1]
+    axis = np.linalg.svd(places - places[0], full_matrices=False)[2][2]
+    if np.abs(surface.normals[around] @ axis).mean() < _LEVEL:
+        return False
     widest = 0.5 * surface.bridge * np.median(surface.spacing[around])
     return surface.project(places).distance.max() <= widest

@@ -75,6 +75,24 @@ def test_a_sheet_without_holes_has_none_although_its_rim_turns():
     assert len(found_around([], bridge=100.0)[0]) == 0
 
 
+def test_the_mouth_of_a_tube_is_none():
+    grid = Grid(np.array([-0.51, -0.51, -1.91]), 0.05, (21, 21, 77))
+
+    def foot(x):
+        around = x[:, :2] / np.maximum(np.linalg.norm(x[:, :2], axis=1), 1e-9)[:, None]
+        return np.column_stack([0.2 * around, np.clip(x[:, 2], -1.5, 1.5)])
+
+    node = grid.positions(np.arange(np.prod(grid.shape)))
+    away = np.linalg.norm(node - foot(node), axis=1).astype(np.float32)
+    cells, faces = isosurface(away.reshape(grid.shape), LEVEL)
+    vertices = grid.origin + grid.spacing * cells
+    points = shapes.cylinder(600) * [0.2, 0.2, 1.5]
+    radial = points / 0.2 * [1, 1, 0]
+    surface = fit_local_surface(points, radial, np.ones(len(points)), local_spacing(points), 9.0)
+    past_rim = np.abs(vertices[:, 2]) > 1.5
+    assert len(find_pinholes(vertices, faces, vertices - foot(vertices), past_rim, surface, grid)) == 0
+
+
 def test_the_rim_of_a_small_sheet_is_none():
     """A square four cells wide has as much iso-surface on either side as there is."""
     points = 0.1 * shapes.square(400)
