@@ -33,17 +33,20 @@ def find_pinholes(vertices, faces, step, past_rim, surface: LocalSurface, grid: 
     if not past_rim.any():
         return nowhere
     turning = _turning(faces, _facing(vertices, step, past_rim, surface))
-    loops = [(loop, _across(vertices[faces[loop]].mean(axis=1), grid.spacing)) for loop in _loops(faces, turning)]
-    loops = [(loop, places) for loop, places in loops if _is_bridged(places, surface)]
-    if not loops:
+    loops = _loops(faces, turning)
+    openings = [_across(vertices[faces[loop]].mean(axis=1), grid.spacing) for loop in loops]
+    row = np.flatnonzero(_are_bridged(openings, surface))
+    if not len(row):
         return nowhere
-    graph = coo_matrix(
-        (np.ones(turning.size - turning.sum(), bool), _ends(faces, ~turning)), shape=(len(vertices),) * 2
-    )
+    along = _ends(faces, ~turning)
+    graph = coo_matrix((np.ones(len(along[0]), bool), along), shape=(len(vertices),) * 2)
     part = connected_components(graph, directed=False)[1]
     size = np.bincount(part)[part]
-    beside = [size[np.stack(_ends(faces[loop], turning[loop]))].min() for loop, _ in loops]
-    kept = [each for (loop, each), least in zip(loops, beside, strict=True) if least > len(loop) ** 2]
+
+    def beside(loop):
+        return size[np.stack(_ends(faces[loop], turning[loop]))].min()
+
+    kept = [openings[i] for i in row if beside(loops[i]) > len(loops[i]) ** 2]
     return np.concatenate([nowhere, *kept])
 
 
@@ -87,12 +90,15 @@ def _across(loop, cell):
     return (middle + share * (loop - middle)).reshape(-1, 3)
 
 
-def _is_bridged(places, surface):
-    """Whether an opening filled with places (m,3) goes on with the sheet around it, as the mouth of a tube does not,
-    and is no wider than the bridging length."""
-    around = surface.tree.query(places[0], k=min(_AROUND, surface.tree.n))[1]
-    axis = np.linalg.svd(places - places[0], full_matrices=False)[2][2]
-    if np.abs(surface.normals[around] @ axis).mean() < _LEVEL:
-        return False
-    widest = 0.5 * surface.bridge * np.median(surface.spacing[around])
-    return surface.project(places).distance.max() <= widest
+def _are_bridged(openings, surface):
+    """Whether openings, each filled with places (m,3), are no wider than the bridging length and go on with the sheet
+    around them, as the mouths of tubes do not; (k,) bool."""
+    if not openings:
+        return np.zeros(0, bool)
+    middle, count = np.stack([places[0] for places in openings]), [len(places) for places in openings]
+    around = surface.tree.query(middle, k=range(1, 1 + min(_AROUND, surface.tree.n)), workers=-1)[1]
+    width, owner = np.zeros(len(openings)), np.repeat(np.arange(len(openings)), count)
+    np.maximum.at(width, owner, surface.project(np.concatenate(openings)).distance)
+    axis = [np.linalg.svd(places - places[0], full_matrices=False)[2][2] for places in openings]
+    level = np.abs(np.einsum("kni,ki->kn", surface.normals[around], np.stack(axis))).mean(axis=1)
+    return (width <= 0.5 * surface.bridge * np.median(surface.spacing[around], axis=1)) & (level >= _LEVEL)
