@@ -14,7 +14,8 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..linalg import dots, row_dots
 from ..lookup import numbered
-from .mesh import at_corners
+from ..parallel import over_rows
+from .mesh import AT_ONCE, at_corners
 
 _LONGEST = 64  # faces of a loop; longer ones go around sheets and wide holes
 _AROUND = 32  # samples, whose median spacing is that of a place
@@ -60,8 +61,15 @@ def _facing(vertices, step, past_rim, surface):
 
 def _turning(faces, facing):
     """Which sides of faces (f,k), from each corner to the next, turn to the other side of the sheet, (f,k) bool."""
-    corners = at_corners(facing, faces)
-    return np.stack([dots(*pair) < 0 for pair in zip(corners, [*corners[1:], corners[0]], strict=True)], axis=1)
+    columns, turning = np.asfortranarray(facing), np.empty(faces.shape, bool)
+
+    def look(part):
+        corners = at_corners(columns, faces[part])
+        for side, pair in enumerate(zip(corners, [*corners[1:], corners[0]], strict=True)):
+            turning[part, side] = dots(*pair) < 0
+
+    over_rows(look, len(faces), AT_ONCE)
+    return turning
 
 
 def _ends(faces, chosen):

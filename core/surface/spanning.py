@@ -21,8 +21,10 @@ def spanning_vertices(vertices, step, past_rim, places, level: float) -> np.ndar
     """
     if not len(places):
         return np.zeros(len(vertices), bool)
-    away = KDTree(places).query(vertices, workers=-1)[0]
-    return (away < np.linalg.norm(step, axis=1)) | (past_rim & (away < _BESIDE * level))
+    length = np.linalg.norm(step, axis=1)
+    farthest = max(length.max(initial=0.0), _BESIDE * level)
+    away = KDTree(places).query(vertices, distance_upper_bound=farthest, workers=-1)[0]
+    return (away < length) | (past_rim & (away < _BESIDE * level))
 
 
 def spanned(vertices: np.ndarray, faces: np.ndarray, loose: np.ndarray) -> np.ndarray:
