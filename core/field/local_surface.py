@@ -17,6 +17,7 @@ from .rim_lines import with_rim_lines
 from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 
 NEIGHBOURS = 16  # of a sample, that its patch is fitted to
+_AROUND = 32  # samples, whose median spacing is that of a place
 _CHUNK = 16384  # samples
 
 
@@ -64,6 +65,11 @@ class LocalSurface:
     def project(self, x: np.ndarray, progress=None, nearest: int = NEAREST) -> Projection:
         """Where queries (m,3) close to the surface fall on it, see :func:`project`."""
         return project(self, x, Progress.of(progress), nearest)
+
+    def around(self, places: np.ndarray) -> np.ndarray:
+        """The samples around places (m,3), whose median spacing is that of the place: the nearest 32, or all where
+        there are fewer, (m,k) int."""
+        return self.tree.query(places, k=range(1, 1 + min(_AROUND, self.tree.n)), workers=-1)[1]
 
 
 def patch_neighbours(tree: KDTree, progress=None) -> np.ndarray:

@@ -5,6 +5,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
+from ..lookup import numbered
 from ..progress import Progress
 from .mesh import edges_of
 from .planes import to_planes
@@ -70,11 +71,9 @@ def _to_meetings(place, side, corner, other, surface, cell, progress):
     found = surface.project(place + step, progress.part(0.0, 0.2))
     onto, off = found.step, found.distance
     part = connected_components(coo_matrix((np.ones(len(corner)), (corner, other)), shape=(len(off),) * 2))[1]
-    row = np.flatnonzero(np.isin(part, part[off > _MET * cell]))
+    chosen = np.isin(part, part[off > _MET * cell])[corner]
+    row, ends = numbered(np.stack([corner, other])[:, chosen])
     if len(row):
-        number = np.full(len(off), -1)
-        number[row] = np.arange(len(row))
-        ends = number[[end[number[corner] >= 0] for end in (corner, other)]]
         further = _laid_again(place[row], side[row], step[row], *ends, surface, cell, progress.part(0.2, 0.8))
         there = surface.project(place[row] + further, progress.part(0.8, 1.0))
         better = (off[row] > _MET * cell) & (there.distance < off[row])

@@ -73,14 +73,13 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     raise_ridges(clamped, band, grid, level)
     shut = shut_leaks(clamped, values, surface, grid, level, progress.part(0.0, 0.02))
     progress(0.02)
-    vertices, faces = _extracted(clamped, level, grid)
-    step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.02, 0.15))
-    places = find_pinholes(vertices, faces, step, past_rim, surface, grid)
+    found = _extracted(clamped, level, band, surface, grid, progress.part(0.02, 0.15))
+    places = find_pinholes(*found, surface, grid)
     if len(places):
         lower_around(places, clamped, grid, level)
         shut = np.concatenate([shut, places])
-        vertices, faces = _extracted(clamped, level, grid)
-        step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.15, 0.3))
+        found = _extracted(clamped, level, band, surface, grid, progress.part(0.15, 0.3))
+    vertices, faces, step, past_rim = found
     loose = spanning_vertices(vertices, step, past_rim, shut, level)
     side = np.where((past_rim | loose)[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
     vertices = evened(_moved(vertices, step, level), faces, past_rim)
@@ -95,9 +94,11 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
 
 
-def _extracted(values, level, grid):
+def _extracted(values, level, band, surface, grid, progress):
+    """Vertices and faces of the iso-surface, steps to the vertices, and whether these are past rims."""
     cells, faces = isosurface(values, level)
-    return grid.origin + grid.spacing * cells, faces
+    vertices = grid.origin + grid.spacing * cells
+    return vertices, faces, *first_steps(vertices, band, surface, grid, progress)
 
 
 def _moved(vertices, step, level):

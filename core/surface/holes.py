@@ -19,7 +19,6 @@ _LONGEST = 64  # edges of a loop that may be closed
 _DETOUR, _CORNER = 1.5, 1.0  # of the way along the other sheet, relative to the straight one, and cells more
 _NEAR = 0.5  # cells, the surface is where it is this near
 _UNSEEN = 2.0  # cells, narrower openings are below what the grid shows
-_AROUND = 32  # samples, whose median spacing is that of a place
 _DOUBLED = 0.75  # of a loop's border, where the filling would lie on faces that are there
 _TINY = np.finfo(float).tiny
 
@@ -69,7 +68,7 @@ def _filled(mesh, borders, loops, paths, surface, cell):
     triangle, loop = fillings(mesh.vertices, loops, *taken, cell)
     longest, off = _reach(mesh.vertices, triangle, loop, loops, surface)
     middle = np.array([mesh.vertices[corners].mean(axis=0) for corners in loops])
-    around = surface.tree.query(middle, k=min(_AROUND, surface.tree.n), workers=-1)[1].reshape(len(loops), -1)
+    around = surface.around(middle)
     bridged = surface.bridge * np.median(surface.spacing[around], axis=1)
     closed = (longest <= np.maximum(bridged, _UNSEEN * cell)) | (off <= _NEAR * cell)
     closed &= _doubled(mesh, edges[counts == 1], loops) < _DOUBLED

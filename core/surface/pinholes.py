@@ -15,10 +15,10 @@ from ..field.local_surface import LocalSurface
 from ..linalg import dots, row_dots
 from ..lookup import numbered
 from ..parallel import over_rows
+from .fillings import edge_keys
 from .mesh import AT_ONCE, at_corners
 
 _LONGEST = 64  # faces of a loop; longer ones go around sheets and wide holes
-_AROUND = 32  # samples, whose median spacing is that of a place
 _LEVEL = 0.5  # least mean cosine between their normals and that of an opening in their sheet
 _APART = 0.5  # cells between the places that fill an opening
 
@@ -80,8 +80,8 @@ def _ends(faces, chosen):
 def _loops(faces, turning):
     """Short closed loops of faces that turn from side to side, each across the next: arrays of their rows."""
     row = np.flatnonzero(turning.any(axis=1))
-    low, high = np.sort(_ends(faces[row], turning[row]), axis=0).astype(np.int64)
-    edge, number = numbered(low * (1 + high.max(initial=0)) + high)
+    sides = np.stack(_ends(faces[row], turning[row]), axis=1)
+    edge, number = numbered(edge_keys(sides, 1 + sides.max(initial=0)))
     times = turning[row].sum(axis=1)
     owner = np.repeat(np.arange(len(row)), times)
     graph = coo_matrix((np.ones(len(owner), bool), (owner, len(row) + number)), shape=(len(row) + len(edge),) * 2)
@@ -104,7 +104,7 @@ def _are_bridged(openings, surface):
     if not openings:
         return np.zeros(0, bool)
     middle, count = np.stack([places[0] for places in openings]), [len(places) for places in openings]
-    around = surface.tree.query(middle, k=range(1, 1 + min(_AROUND, surface.tree.n)), workers=-1)[1]
+    around = surface.around(middle)
     width, owner = np.zeros(len(openings)), np.repeat(np.arange(len(openings)), count)
     np.maximum.at(width, owner, surface.project(np.concatenate(openings)).distance)
     axis = [np.linalg.svd(places - places[0], full_matrices=False)[2][2] for places in openings]

@@ -30,12 +30,17 @@ def foot_points(x, holes):
     return foot, past_rim
 
 
+def iso_surface(grid, foot):
+    """Vertices and faces of that around the surface onto which a function takes places (m,3)."""
+    node = grid.positions(np.arange(np.prod(grid.shape)))
+    away = np.linalg.norm(node - foot(node), axis=1).astype(np.float32)
+    cells, faces = isosurface(away.reshape(grid.shape), LEVEL)
+    return grid.origin + grid.spacing * cells, faces
+
+
 def found_around(holes, bridge=3.0):
     """Pinholes of the exact iso-surface around that square, whose samples lie a spacing off the rims of its holes."""
-    node = GRID.positions(np.arange(np.prod(GRID.shape)))
-    away = np.linalg.norm(node - foot_points(node, holes)[0], axis=1).astype(np.float32)
-    cells, faces = isosurface(away.reshape(GRID.shape), LEVEL)
-    vertices = GRID.origin + GRID.spacing * cells
+    vertices, faces = iso_surface(GRID, lambda x: foot_points(x, holes)[0])
     foot, past_rim = foot_points(vertices, holes)
     points = shapes.square(int(4 / SPACING**2))
     for centre, radius in holes:
@@ -82,10 +87,7 @@ def test_the_mouth_of_a_tube_is_none():
         around = x[:, :2] / np.maximum(np.linalg.norm(x[:, :2], axis=1), 1e-9)[:, None]
         return np.column_stack([0.2 * around, np.clip(x[:, 2], -1.5, 1.5)])
 
-    node = grid.positions(np.arange(np.prod(grid.shape)))
-    away = np.linalg.norm(node - foot(node), axis=1).astype(np.float32)
-    cells, faces = isosurface(away.reshape(grid.shape), LEVEL)
-    vertices = grid.origin + grid.spacing * cells
+    vertices, faces = iso_surface(grid, foot)
     points = shapes.cylinder(600) * [0.2, 0.2, 1.5]
     radial = points / 0.2 * [1, 1, 0]
     surface = fit_local_surface(points, radial, np.ones(len(points)), local_spacing(points), 9.0)
@@ -96,14 +98,11 @@ def test_the_mouth_of_a_tube_is_none():
 def test_the_rim_of_a_small_sheet_is_none():
     """A square four cells wide has as much iso-surface on either side as there is."""
     points = 0.1 * shapes.square(400)
-    node = GRID.positions(np.arange(np.prod(GRID.shape)))
 
     def foot(x):
         return np.column_stack([np.clip(x[:, :2], -0.1, 0.1), np.zeros(len(x))])
 
-    away = np.linalg.norm(node - foot(node), axis=1).astype(np.float32)
-    cells, faces = isosurface(away.reshape(GRID.shape), LEVEL)
-    vertices = GRID.origin + GRID.spacing * cells
+    vertices, faces = iso_surface(GRID, foot)
     step = vertices - foot(vertices)
     past_rim = (np.abs(vertices[:, :2]) > 0.1).any(axis=1)
     assert len(find_pinholes(vertices, faces, step, past_rim, surface_of(points, 100.0), GRID)) == 0
