@@ -6,6 +6,7 @@ from ..field.blocks import each
 from ..field.grid import Grid, padding_cells
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
+from ..lookup import rows_of
 from ..progress import Progress
 from .centring import centred
 from .corners import into_corners
@@ -78,7 +79,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     if len(places):
         lower_around(places, clamped, grid, level)
         shut = np.concatenate([shut, places])
-        found = _extracted(clamped, level, band, surface, grid, progress.part(0.15, 0.3))
+        found = _extracted(clamped, level, band, surface, grid, progress.part(0.15, 0.3), found)
     vertices, faces, step, past_rim = found
     loose = spanning_vertices(vertices, step, past_rim, shut, level)
     side = np.where((past_rim | loose)[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
@@ -94,11 +95,28 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
 
 
-def _extracted(values, level, band, surface, grid, progress):
-    """Vertices and faces of the iso-surface, steps to the vertices, and whether these are past rims."""
+def _extracted(values, level, band, surface, grid, progress, before=None):
+    """Vertices and faces of the iso-surface, steps to the vertices, and whether these are past rims; for vertices that
+    it had `before`, as they were found then."""
     cells, faces = isosurface(values, level)
     vertices = grid.origin + grid.spacing * cells
-    return vertices, faces, *first_steps(vertices, band, surface, grid, progress)
+    step, past_rim, fresh = np.empty_like(vertices), np.empty(len(vertices), bool), np.ones(len(vertices), bool)
+    if before is not None:
+        row, old = _shared(vertices, before[0])
+        step[row], past_rim[row], fresh[row] = before[2][old], before[3][old], False
+    step[fresh], past_rim[fresh] = first_steps(vertices[fresh], band, surface, grid, progress)
+    return vertices, faces, step, past_rim
+
+
+def _shared(vertices, others):
+    """Which of some vertices (v,3) are among others (w,3) as well: their rows in either."""
+    key, their_key = (x[:, 0] + np.sqrt(2) * x[:, 1] + np.sqrt(3) * x[:, 2] for x in (vertices, others))
+    order = np.argsort(their_key)
+    found = rows_of(key, their_key[order])
+    row = np.flatnonzero(found >= 0)
+    old = order[found[row]]
+    same = (vertices[row] == others[old]).all(axis=1)
+    return row[same], old[same]
 
 
 def _moved(vertices, step, level):
