@@ -7,6 +7,7 @@ from core import Settings, reconstruct
 from core.field.grid import Grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.surface import double_cover
 from core.surface.isosurface import isosurface
 from core.surface.pinholes import _loops, find_pinholes
 from tests import shapes
@@ -155,3 +156,14 @@ def test_runs_span_pinholes_smoothly_and_leave_wide_holes(seed, off, band):
     vertices = cover.vertices[from_holes(cover.vertices) < 0.15]
     assert np.abs(vertices[:, 2] - wave(vertices[:, 0])).max() < off
     assert shapes.euler(reconstruct(pierced(seed, 4.0), Settings(resolution=64, band=band)).surface) == -4
+
+
+def test_once_they_are_filled_only_new_vertices_look_for_the_surface_again(monkeypatch):
+    asked, look = [], double_cover.first_steps
+    monkeypatch.setattr(double_cover, "first_steps", lambda x, *rest: asked.append(len(x)) or look(x, *rest))
+    vertices = reconstruct(pierced(0, 2.2), Settings(resolution=64)).surface.vertices
+    every, new = asked
+    assert 0 < new < every / 10
+    monkeypatch.setattr(double_cover, "_shared", lambda *_: (np.empty(0, int), np.empty(0, int)))
+    np.testing.assert_array_equal(reconstruct(pierced(0, 2.2), Settings(resolution=64)).surface.vertices, vertices)
+    assert asked[3] > every / 2
