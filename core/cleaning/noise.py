@@ -13,7 +13,7 @@ from .roughness import least_part, roughness
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
 
 _AGREED = 0.96  # median confidence of normals that noise of a tenth of a local spacing does not reach
-_TURNED = 2.5  # times the squared level, in local spacings, that slight noise takes off the confidence of normals
+_TURNED = 1.5  # times the squared level, in local spacings, that slight noise takes off the confidence of normals
 _CORE_LEVEL = 0.1  # local spacings: the core of a noisy part is above this
 _CORE_AGREED = 0.87  # and its normals agree less than this; creases and thin sheets kept above .88
 _PATCHES, _PATCH = 16, 300  # patches of a large cloud in which normals are asked, samples in each
@@ -36,7 +36,8 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
 
     A cloud is noisy as a whole where nearly all of it looks so; noise of hundredths of a local spacing, as of rounded
     coordinates, counts where it grows no more up to 32 neighbours, either. Otherwise its noisy parts are those that
-    look so around a core that is well above all limits and not small: creases and thin sheets look noisy in places.
+    look so throughout, or around a core that is well above all limits and not small: creases and thin sheets look noisy
+    in places.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
@@ -49,18 +50,22 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         turned = agreement < 1 - _TURNED * np.median(relative) ** 2
         if (found.loud and agreement < _AGREED) or (found.slight and turned):
             return ~clean
-    if found.suspect.sum() < least_part(anchors):
+    suspect = found.even
+    if found.suspect.sum() >= least_part(anchors):
+        suspect = suspect | _around_loud_cores(found, _agreement(points, spacing, progress.part(0.3, 0.9)))
+    if not suspect.any():
         return clean
-
-    confidence = _agreement(points, spacing, progress.part(0.3, 0.9))
-    agreement = np.median(confidence[anchors][region], axis=1)
-    suspect = found.suspect & (agreement < _AGREED)
-    core = suspect & (relative > _CORE_LEVEL) & (agreement < _CORE_AGREED)
-    if core.sum() < least_part(anchors):
-        return clean
-    suspect &= core[region].any(axis=1)
     noisy = suspect[region[:, :SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
     return noisy[nearest_anchor(points, points[anchors], progress.part(0.9, 1.0))]
+
+
+def _around_loud_cores(found, confidence):
+    """Which anchors look noisy to normals with such a confidence (n,), too, around a core that does most of all, (m,)
+    bool; none where that is small."""
+    agreement = np.median(confidence[found.anchors][found.region], axis=1)
+    suspect = found.suspect & (agreement < _AGREED)
+    core = suspect & (found.relative > _CORE_LEVEL) & (agreement < _CORE_AGREED)
+    return suspect & (core.sum() >= least_part(found.anchors)) & core[found.region].any(axis=1)
 
 
 def _typical_agreement(points, spacing, seed, progress):

@@ -16,8 +16,11 @@ _DROWNED = 0.3  # local spacings: above it few neighbours see too little of the 
 _DETAIL = 1.2  # times that errors grow from few to many neighbours where averaging would blunt more than noise does
 _FLOODED = 0.4  # local spacings: above it noise itself grows so much
 _SLIGHT = 0.006  # local spacings: nine tenths of the regions of a slightly noisy cloud are above it
-_STEADY = 1.05  # from more to many neighbours slight noise grows less, detail that averaging would blunt more
+_ALIKE = 1.1  # from few to more, and from more to many, slight noise grows less, detail that averaging would blunt more
 _SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
+_FAINT = 0.03  # local spacings: errors in parts that are evenly noisy are above it
+_AMID = 0.8  # of the anchors around one in the core of such a part, these look so as well
+_CORE = 0.02  # of a cloud, the cores of such parts together
 
 
 @dataclass(frozen=True)
@@ -26,12 +29,14 @@ class Roughness:
 
     loud, slight : whether the cloud as a whole looks noisy, or may be so by hundredths of a local spacing
     suspect      : (m,) bool, which anchors look noisy     relative : (m,) how far these are off, local spacings
+    even         : (m,) bool, which do amid others that do, through any number of neighbours
     anchors      : (m,) rows of the samples                region   : (m,k) the anchors nearest to each
     """
 
     loud: bool
     slight: bool
     suspect: np.ndarray
+    even: np.ndarray
     relative: np.ndarray
     anchors: np.ndarray
     region: np.ndarray
@@ -55,15 +60,17 @@ def roughness(points, spacing, seed: int, progress: Progress) -> Roughness:
     growth = _ratio(wide, fine)
     everywhere, level = np.percentile(relative, (10, 50))
     suspect = _rough(relative, growth)
+    even = (relative > _FAINT) & (relative < _DROWNED) & (growth < _ALIKE)
     loud = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
-    slight = everywhere > _SLIGHT and np.median(growth) < _GROWTH
-    if loud or slight or suspect.sum() >= least_part(anchors):
+    slight = everywhere > _SLIGHT and np.median(growth) < _ALIKE
+    if loud or slight or suspect.sum() >= least_part(anchors) or even.mean() >= _CORE:
         (wider,) = missed((_MANY,), progress.part(0.08, 0.1))
-        further = _ratio(wider, fine)
+        further, last = _ratio(wider, fine), _ratio(wider, wide)
         suspect &= ~_detailed(relative, further)
         loud &= not _detailed(level, np.median(further))
-        slight &= np.median(_ratio(wider, wide)) < _STEADY
-    return Roughness(bool(loud), bool(slight), suspect, relative, anchors, region)
+        slight &= np.median(last) < _ALIKE
+        even &= last < _ALIKE
+    return Roughness(bool(loud), bool(slight), suspect, _in_parts(even, region), relative, anchors, region)
 
 
 def least_part(anchors) -> float:
@@ -73,6 +80,12 @@ def least_part(anchors) -> float:
 
 def _ratio(a, b):
     return a / np.maximum(b, np.finfo(float).tiny)
+
+
+def _in_parts(even, region):
+    """Those of some anchors, (m,) bool, that are near the core of a part; none where the cores are small."""
+    core = even[region].mean(axis=1) > _AMID
+    return even & (core.mean() >= _CORE) & core[region].any(axis=1)
 
 
 def _rough(relative, growth):

@@ -100,11 +100,35 @@ def test_what_is_rough_in_a_small_place_may_be_detail():
     assert not noisy_samples(points, local_spacing(points)).any()
 
 
-def test_what_is_faint_in_one_half_may_be_detail():
-    points = shapes.torus(2000)
-    half = points[:, 0] > 0
-    points[half] = noisy(points[half], 0.15 * np.median(local_spacing(points)))
+@pytest.mark.parametrize("share", [0.07, 0.15])
+@pytest.mark.parametrize("shape", [shapes.torus(3000), shapes.scattered_sphere(5000)], ids=["torus", "sphere"])
+def test_faint_noise_of_one_half_is_found_there(shape, share):
+    points, half = shape.copy(), shape[:, 0] > 0
+    points[half] = noisy(points[half], share * np.median(local_spacing(points)))
+    found = noisy_samples(points, local_spacing(points))
+    assert found[half].mean() > 0.9
+    assert not found[shape[:, 0] < -0.4].any()
+
+
+def test_waves_of_one_half_are_detail():
+    waves = waved(3000, 4, 0.2, 0.0)
+    waves[waves[:, 0] < 0, 2] = 0
+    assert not noisy_samples(waves, local_spacing(waves)).any()
+
+
+def bumpy(n, height):
+    x, y, z = 5 * shapes.scattered_sphere(n).T
+    return np.column_stack([x, y, z]) / 5 * (1 + height * np.sin(x) * np.sin(y) * np.sin(z + 1))[:, None]
+
+
+@pytest.mark.parametrize(("height", "share"), [(0.0, 0.1), (0.0, 0.3), (0.2, 0.2), (0.2, 0.3)])
+def test_shifted_scans_are_noisy_as_a_whole(height, share):
+    """Though they agree where the shift runs along the surface, and what shows there is detail."""
+    points = bumpy(5000, height)
     assert not noisy_samples(points, local_spacing(points)).any()
+    second = np.random.default_rng(1).random(len(points)) < 0.5
+    points[second] += share * np.median(local_spacing(points)) * np.array([0.3, 0.4, 0.866])
+    assert noisy_samples(points, local_spacing(points)).all()
 
 
 def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():
