@@ -26,12 +26,14 @@ from .noise_measure import (
     JET_NEIGHBOURS,
     NOISE,
     PCA_NEIGHBOURS,
+    SHIFTS,
     SLIGHT,
     STRAYS,
     measure_between,
     measure_faint,
     measure_half,
     measure_noise,
+    measure_shifted,
     measure_slight,
     measure_strays,
     share_noisy,
@@ -109,6 +111,13 @@ Where points are too sparse for some of the shape, noise below a twentieth is ta
 
 {slight}
 
+### Two scans, shifted against each other
+
+Every point is of the one or the other scan, at random, and these are apart by so many local spacings in one direction.
+CD (HD) to the surface halfway.
+
+{shifted}
+
 ### Noise in one half
 
 Noise of {half_noise:g} % in the half with larger x. *moved*: shares of the noisy and of the clean half that are moved.
@@ -117,11 +126,11 @@ Noise of {half_noise:g} % in the half with larger x. *moved*: shares of the nois
 
 All {clean_runs} clean samplings of cases in the folder were looked at for noise too; taken for noisy: {taken}.
 
-### Noise too faint or in too small a part
+### Faint noise in a part, noise in a small part
 
-Such noise is left alone. What that costs: noise in local spacings in the half with larger x (slab), or in a small part
-at the top (cap). *moved*: share of the noisy points that are. *there alone*: CD with the noisy points moved as
-`denoise=1` moves them and no other, by someone who knows which they are.
+Noise in local spacings in the half with larger x (slab), or in a small part at the top (cap), which is left alone.
+*moved*: share of the noisy points that are. *there alone*: CD with the noisy points moved as `denoise=1` moves them and
+no other, by someone who knows which they are.
 
 {faint}
 
@@ -228,6 +237,7 @@ def measure(cases: list[Case], others: list[Path], shape: Path) -> dict:
         "uneven": [said(name, noise_uneven.measure(name)) for name in noise_uneven.UNEVEN],
         "faint": [said(f"{case.name}, faint noise", measure_faint(case, *how)) for case in cases[:2] for how in FAINT],
         "slight": [said(f"{case.name}, slight noise", measure_slight(case, by)) for case in cases for by in SLIGHT],
+        "shifted": [said(f"{case.name}, two scans", measure_shifted(case, by)) for case in cases for by in SHIFTS],
         "between": [said(f"{case.name}, {p} %", measure_between(case, p)) for case in cases for p in published.NOISE],
         "costs": list(_costs(others, shape)),
         **_stopping(),
@@ -301,7 +311,8 @@ def write_page(measured: dict, docs: Path) -> Path:
         taken=tables.listed(f"{share:.1%} of {name}" for name, share in measured["clean"].items() if share),
         strays=tables.markdown(tables.strays(measured["strays"])),
         published=tables.markdown(tables.beside_published(measured)),
-        slight=tables.markdown(tables.slight(measured["slight"])),
+        slight=tables.markdown(tables.by_level(measured["slight"], "noise")),
+        shifted=tables.markdown(tables.by_level(measured["shifted"], "shift")),
         faint=tables.markdown(tables.faint(measured["faint"])),
         wire_runs=noise_wires.RUNS,
         wires=tables.markdown(tables.wires(measured["wires"])),

@@ -1,6 +1,7 @@
 """Noise and stray points on clean cases: what each way to a surface makes of them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -22,6 +23,8 @@ HALF_NOISE = 0.5
 FAINT = [("slab", 0.5, level) for level in (0.05, 0.1, 0.15, 0.2)]  # part, its share of the points, local spacings
 FAINT += [("cap", share, 0.4) for share in (0.04, 0.08)]
 SLIGHT = (0.01, 0.02, 0.03, 0.05, 0.08)  # local spacings
+SHIFTS = (0.05, 0.1, 0.2, 0.3, 0.5)  # local spacings
+SHIFTED_BY = np.array([0.33, 0.44, 0.835])  # direction, which no case has for an axis
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24
@@ -130,7 +133,7 @@ def measure_strays(case: Case, share: float) -> dict:
 
 
 def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
-    """What it costs that faint noise, or noise in a small part, is left alone. `share` of the points, those with the
+    """What it costs to miss faint noise in a part, or noise in a small one. `share` of the points, those with the
     largest x (a "slab") or nearest to the topmost one (a "cap"), get noise of `level` median local spacings. CD as it
     comes out, and with these points alone cleaned; share of them moved."""
     points = case.points
@@ -154,17 +157,29 @@ def measure_faint(case: Case, part: str, share: float, level: float) -> dict:
 
 
 def measure_slight(case: Case, level: float) -> dict:
-    """What is made of noise of `level` median local spacings in every point: share of them moved, CD and HD, also with
-    no point moved and with all."""
-    points = case.points + _shift(case.points, level)
+    """What is made of noise of `level` median local spacings in every point, see :func:`_by_level`."""
+    return _by_level(case.name, level, case.points + _shift(case.points, level), case.truth)
+
+
+def measure_shifted(case: Case, level: float) -> dict:
+    """What is made of two scans, each a random half of the points, that are `level` median local spacings apart, see
+    :func:`_by_level`; the true surface is halfway."""
+    step = level * np.median(local_spacing(case.points)) * SHIFTED_BY / np.linalg.norm(SHIFTED_BY)
+    second = np.random.default_rng(0).random(len(case.points)) < 0.5
+    halfway = replace(case.truth, vertices=case.truth.vertices + 0.5 * step)
+    return _by_level(case.name, level, case.points + second[:, None] * step, halfway)
+
+
+def _by_level(name, level, points, truth):
+    """Share of the points moved, CD and HD, also with no point moved and with all."""
     result, none, every = _by_strength(points)
     return {
-        "case": case.name,
+        "case": name,
         "level": level,
         "moved": _moved(result, points).mean(),
-        "ours": cd_and_hd(result.surface, case.truth),
-        "none": cd_and_hd(none.surface, case.truth),
-        "every": cd_and_hd(every.surface, case.truth),
+        "ours": cd_and_hd(result.surface, truth),
+        "none": cd_and_hd(none.surface, truth),
+        "every": cd_and_hd(every.surface, truth),
     }
 
 

@@ -114,8 +114,8 @@ def faint(rows):
         )
 
 
-def slight(rows):
-    yield "case", "noise, local spacings", "moved", "here", "`denoise=0`", "`denoise=1`"
+def by_level(rows, what):
+    yield "case", f"{what}, local spacings", "moved", "here", "`denoise=0`", "`denoise=1`"
     for row in rows:
         yield row["case"], f"{row['level']:g}", f"{row['moved']:.0%}", *_cd_and_hd(row, ("ours", "none", "every"))
 

@@ -23,6 +23,7 @@ from benchmarks.noise_measure import (
     STRAYS,
     by_peer,
     half_noisy,
+    measure_shifted,
     measure_slight,
     measure_strays,
     noisy,
@@ -91,17 +92,18 @@ def test_strays_found_and_points_lost_are_told_apart(square, monkeypatch):
     assert clean["cd"] == clean["untreated_cd"] < 20
 
 
-def test_slight_noise_is_moved_as_all_noise_is(monkeypatch):
+@pytest.mark.parametrize("measure", [measure_slight, measure_shifted])
+def test_slight_noise_is_moved_as_all_noise_is_and_so_are_shifted_scans(measure, monkeypatch):
     monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
     monkeypatch.setattr(noise_measure, "Settings", partial(Settings, resolution=32))
     truth = closed.torus().mesh
     points, normals = surface_samples(truth, 3000, np.random.default_rng(1))[:2]
     case = Case("torus", points, normals, truth, np.empty((0, 3)), {"category": "watertight"})
-    found = measure_slight(case, 0.08)
+    found = measure(case, 0.1)
     assert found["moved"] == 1.0
     assert found["ours"] == found["every"]
     assert found["ours"]["cd"] < found["none"]["cd"]
-    assert measure_slight(case, 0.0)["moved"] == 0.0
+    assert measure(case, 0.0)["moved"] == 0.0
 
 
 @pytest.mark.parametrize("name", WIRES)
@@ -213,6 +215,10 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2, said=1.1, lost=0.0)
             {"case": "one", "level": 0.03, "moved": 1.0}
             | {way: {"cd": cd, "hd": 9.4} for way, cd in (("ours", 0.14), ("none", 0.43), ("every", 0.14))}
         ],
+        "shifted": [
+            {"case": "one", "level": 0.2, "moved": 0.5}
+            | {way: {"cd": cd, "hd": 8.4} for way, cd in (("ours", 0.24), ("none", 0.53), ("every", 0.22))}
+        ],
         "between": [{"case": case, "percent": percent, "cd": 0.625} for case in CASES for percent in published.NOISE],
         "costs": [
             {
@@ -248,6 +254,7 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
     assert "| junk | refused | a·b·ccc" in page
     assert "| a helix | – / 0.0% | 81% / 0.2% |" in page
     assert "| one | 0.03 | 100% | 0.140 (9) | 0.430 (9) | 0.140 (9) |" in page
+    assert "| one | 0.2 | 50% | 0.240 (8) | 0.530 (8) | 0.220 (8) |" in page
     assert "| one | cap | 4% | 0.4 | 0% | 0.204 | 0.199 |" in page
     assert "| one | uniform | both | 512, band 4 | 30.0 | 25.0 | 1.20 | 110 | 100 | 1.10 |" in page
     assert "| 0.3 % noise | 0.62 | 0.62 | 0.62 | 1.20 | – |" in page
