@@ -16,6 +16,7 @@ _DROWNED = 0.3  # local spacings: above it few neighbours see too little of the 
 _DETAIL = 1.2  # times that errors grow from few to many neighbours where averaging would blunt more than noise does
 _FLOODED = 0.4  # local spacings: above it noise itself grows so much
 _SLIGHT = 0.006  # local spacings: nine tenths of the regions of a slightly noisy cloud are above it
+_UNLIKE = 10.0  # times as rough as its smoothest tenth is the roughest tenth of a cloud that is noisy in parts only
 _ALIKE = 1.1  # from few to more, and from more to many, slight noise grows less, detail that averaging would blunt more
 _SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
 _FAINT = 0.03  # local spacings: errors in parts that are evenly noisy are above it
@@ -58,11 +59,11 @@ def roughness(points, spacing, seed: int, progress: Progress) -> Roughness:
     fine, wide = missed((_FEW, _MORE), progress.part(0.0, 0.08))
     relative = wide / np.median(spacing[anchors][region], axis=1)
     growth = _ratio(wide, fine)
-    everywhere, level = np.percentile(relative, (10, 50))
+    everywhere, level, roughest = np.percentile(relative, (10, 50, 90))
     suspect = _rough(relative, growth)
     even = (relative > _FAINT) & (relative < _DROWNED) & (growth < _ALIKE)
     loud = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
-    slight = everywhere > _SLIGHT and np.median(growth) < _ALIKE
+    slight = everywhere > max(_SLIGHT, roughest / _UNLIKE) and np.median(growth) < _ALIKE
     if loud or slight or suspect.sum() >= least_part(anchors) or even.mean() >= _CORE:
         (wider,) = missed((_MANY,), progress.part(0.08, 0.1))
         further, last = _ratio(wider, fine), _ratio(wider, wide)
