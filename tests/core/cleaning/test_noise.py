@@ -110,6 +110,15 @@ def test_faint_noise_of_one_half_is_found_there(shape, share):
     assert not found[shape[:, 0] < -0.4].any()
 
 
+def test_noise_of_one_half_is_not_averaged_as_the_slight_noise_of_the_other_is():
+    points = shapes.scattered_sphere(5000)
+    spacing, half = np.median(local_spacing(points)), points[:, 0] > 0
+    points = noisy(points, np.where(half, 0.2, 0.01)[:, None] * spacing)
+    found = noisy_samples(points, local_spacing(points))
+    assert found[half].mean() > 0.95
+    assert not found[points[:, 0] < -0.5].any()
+
+
 def test_waves_of_one_half_are_detail():
     waves = waved(3000, 4, 0.2, 0.0)
     waves[waves[:, 0] < 0, 2] = 0
