@@ -19,7 +19,7 @@ _SLIGHT = 0.006  # local spacings: nine tenths of the regions of a slightly nois
 _UNLIKE = 10.0  # times as rough as its smoothest tenth is the roughest tenth of a cloud that is noisy in parts only
 _ALIKE = 1.1  # from few to more, and from more to many, slight noise grows less, detail that averaging would blunt more
 _SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
-_FAINT = 0.03  # local spacings: errors in parts that are evenly noisy are above it
+_FAINT, _GROWS = 0.03, 1.2  # local spacings: errors in evenly noisy parts are above it; and grow less from few to more
 _AMID = 0.8  # of the anchors around one in the core of such a part, these look so as well
 _CORE = 0.02  # of a cloud, the cores of such parts together
 
@@ -61,7 +61,7 @@ def roughness(points, spacing, seed: int, progress: Progress) -> Roughness:
     growth = _ratio(wide, fine)
     everywhere, level, roughest = np.percentile(relative, (10, 50, 90))
     suspect = _rough(relative, growth)
-    even = (relative > _FAINT) & (relative < _DROWNED) & (growth < _ALIKE)
+    even = (relative > _FAINT) & (relative < _DROWNED) & (growth < _GROWS)
     loud = everywhere > _EVERYWHERE and _rough(level, np.median(growth))
     slight = everywhere > max(_SLIGHT, roughest / _UNLIKE) and np.median(growth) < _ALIKE
     if loud or slight or suspect.sum() >= least_part(anchors) or even.mean() >= _CORE:
