@@ -19,7 +19,8 @@ _SLIGHT = 0.006  # local spacings: nine tenths of the regions of a slightly nois
 _UNLIKE = 10.0  # times as rough as its smoothest tenth is the roughest tenth of a cloud that is noisy in parts only
 _ALIKE = 1.1  # from few to more, and from more to many, slight noise grows less, detail that averaging would blunt more
 _SMALLEST_PART = 0.05  # of a cloud that is noisy in parts
-_FAINT, _GROWS = 0.03, 1.2  # local spacings: errors in evenly noisy parts are above it; and grow less from few to more
+_FAINT = 0.03  # local spacings: errors in parts that are evenly noisy are above it
+_GROWS = 1.2  # times that these grow at most, from few to more
 _AMID = 0.8  # of the anchors around one in the core of such a part, these look so as well
 _CORE = 0.02  # of a cloud, the cores of such parts together
 
