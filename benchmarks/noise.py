@@ -128,9 +128,9 @@ All {clean_runs} clean samplings of cases in the folder were looked at for noise
 
 ### Faint noise in a part, noise in a small part
 
-Noise in local spacings in the half with larger x (slab), or in a small part at the top (cap), which is left alone.
-*moved*: share of the noisy points that are. *there alone*: CD with the noisy points moved as `denoise=1` moves them and
-no other, by someone who knows which they are.
+Noise in local spacings in the half with larger x (slab), or in a small part at the top (cap), which may be taken for
+detail and left alone. *moved*: share of the noisy points that are. *there alone*: CD with the noisy points moved as
+`denoise=1` moves them and no other, by someone who knows which they are.
 
 {faint}
 

@@ -24,11 +24,12 @@ FAINT = [("slab", 0.5, level) for level in (0.05, 0.1, 0.15, 0.2)]  # part, its 
 FAINT += [("cap", share, 0.4) for share in (0.04, 0.08)]
 SLIGHT = (0.01, 0.02, 0.03, 0.05, 0.08)  # local spacings
 SHIFTS = (0.05, 0.1, 0.2, 0.3, 0.5)  # local spacings
-SHIFTED_BY = np.array([0.33, 0.44, 0.835])  # direction, which no case has for an axis
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24
 MARGIN = 1.1  # strays fill the box of the object, this much enlarged
+
+_SHIFTED_BY = np.array([0.33, 0.44, 0.835])  # direction, which no case has for an axis
 
 
 def noisy(case: Case, percent: float, seed: int = 0) -> np.ndarray:
@@ -164,7 +165,7 @@ def measure_slight(case: Case, level: float) -> dict:
 def measure_shifted(case: Case, level: float) -> dict:
     """What is made of two scans, each a random half of the points, that are `level` median local spacings apart, see
     :func:`_by_level`; the true surface is halfway."""
-    step = level * np.median(local_spacing(case.points)) * SHIFTED_BY / np.linalg.norm(SHIFTED_BY)
+    step = level * np.median(local_spacing(case.points)) * _SHIFTED_BY / np.linalg.norm(_SHIFTED_BY)
     second = np.random.default_rng(0).random(len(case.points)) < 0.5
     halfway = replace(case.truth, vertices=case.truth.vertices + 0.5 * step)
     return _by_level(case.name, level, case.points + second[:, None] * step, halfway)

@@ -100,10 +100,11 @@ def _extracted(values, level, band, surface, grid, progress, before=None):
     it had `before`, as they were found then."""
     cells, faces = isosurface(values, level)
     vertices = grid.origin + grid.spacing * cells
+    if before is None:
+        return vertices, faces, *first_steps(vertices, band, surface, grid, progress)
     step, past_rim, fresh = np.empty_like(vertices), np.empty(len(vertices), bool), np.ones(len(vertices), bool)
-    if before is not None:
-        row, old = _shared(vertices, before[0])
-        step[row], past_rim[row], fresh[row] = before[2][old], before[3][old], False
+    row, old = _shared(vertices, before[0])
+    step[row], past_rim[row], fresh[row] = before[2][old], before[3][old], False
     step[fresh], past_rim[fresh] = first_steps(vertices[fresh], band, surface, grid, progress)
     return vertices, faces, step, past_rim
 
