@@ -33,6 +33,7 @@ _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
 _DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
 _SMALL_PART, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part
+_LOOKS, _SLIGHT = 256, 0.25  # samples of a part whose wider neighbourhoods are looked at; a sheet is thinner in some
 _SHELL = 16, 0.95, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
 
 _DIRTY = 0.005  # share of strays from which on those close to the surface are looked for as well
@@ -46,10 +47,11 @@ def find_outliers(points, progress=None) -> np.ndarray:
     """(n,) bool: which samples (n,3), float64 and finite, are strays.
 
     - beside a surface: lonelier than its neighbours and off their plane, or far lonelier;
-    - scattered: sparse against the whole cloud, where most sparse samples around form no surface;
+    - scattered: sparse against the whole cloud, where most sparse samples around form no surface, nor all of them one;
     - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
       as sparse, which may be a wire sampled less;
-    - detached: in a small part of its own that is a cloud rather than a sheet or the shell of a convex body;
+    - detached: in a small part of its own that is a cloud rather than a sheet, be it a noisy one, or the shell of a
+      convex body;
     - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
     """
     progress = Progress.of(progress)
@@ -133,7 +135,8 @@ class _Surroundings:
         tree = KDTree(self.points[sparse])
         for part in progress.chunks(len(sparse), _CHUNK):
             around = tree.query(self.points[sparse[part]], k=k, workers=-1)[1].reshape(-1, k)
-            found[sparse[part]] = astray[sparse[around]].mean(axis=1) > _MAJORITY
+            astray_there = astray[sparse[around]].mean(axis=1) > _MAJORITY
+            found[sparse[part]] = astray_there & (_thickness(self.points[sparse[around]]) > _SLIGHT)
         return found
 
     def off_wires(self):
@@ -171,8 +174,27 @@ class _Surroundings:
         by_part = np.argsort(part, kind="stable")
         for number in np.flatnonzero(clouds & (size >= _SHELL[0])):
             row = by_part[ends[number] - size[number] : ends[number]]
-            clouds[number] = not _is_shell(self.points[row], self.spacing[row])
+            sheet = _is_sheet(self.points[row]) or _is_shell(self.points[row], self.spacing[row])
+            clouds[number] = not sheet
         return clouds[part]
+
+
+def _is_sheet(points):
+    """Whether a part's points (m,3) are a sheet with noise: thin in some neighbourhoods wider than their noise."""
+    tree, some = KDTree(points), points[:: -(-len(points) // _LOOKS)]
+    k = 2 * _NEIGHBOURS
+    while k <= len(points):
+        if np.median(_thickness(points[tree.query(some, k=k)[1]])) < _SLIGHT:
+            return True
+        k *= 2
+    return False
+
+
+def _thickness(groups):
+    """Of each group of points (n,k,3) the least extent over its size, like that of neighbourhoods."""
+    groups = groups - groups.mean(axis=1, keepdims=True)
+    squared = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", groups, groups))
+    return np.sqrt(np.maximum(squared[:, 0], 0.0) / np.maximum(squared.sum(axis=1), np.finfo(float).tiny))
 
 
 def _is_shell(points, spacing):

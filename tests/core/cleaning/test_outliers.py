@@ -90,6 +90,21 @@ def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
     assert not find_outliers(with_strays(flat)[0]).any()
 
 
+@pytest.mark.parametrize("noise", [0.01, 0.025])
+def test_a_noisy_sheet_of_its_own_stays(noise):
+    rng = np.random.default_rng(1)
+    wall = rng.uniform(-2, 2, (30000, 3)) * [1, 1, 0]
+    sheet = rng.uniform(-1, 1, (400, 3)) * [0.4, 0.2, 0] + rng.normal(size=(400, 3)) * [0, 0, noise] + [0, 0, 1]
+    assert not find_outliers(np.vstack([wall, sheet]))[30000:].any()
+
+
+def test_a_noisy_sheet_of_fewer_samples_than_others_stays():
+    rng = np.random.default_rng(1)
+    near = rng.uniform(-0.3, 0.3, (10000, 3)) * [1, 1, 0]
+    far = rng.uniform(-1, 1, (2000, 3)) * [1, 1, 0] + rng.normal(size=(2000, 3)) * [0, 0, 0.022] + [0, 0, 1]
+    assert find_outliers(np.vstack([near, far])).mean() < 0.002
+
+
 @pytest.mark.parametrize("count", [18, 24, 60])
 def test_a_small_closed_body_of_its_own_stays(count):
     rng, half = np.random.default_rng(2), 0.012 * np.sqrt(count)
