@@ -27,6 +27,8 @@ _CHUNK = 8192  # samples
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
 _WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
 _ASTRAY, _FEW = 0.01, 5  # share and number of samples off all wires above which they are strays: ends of wires are, too
+_PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
+_MANY_PROUD = 0.00125  # share of such samples above which they are strays: corners have some
 _PEERS, _AS_SPARSE, _IN_LINE = 6, 0.5, 3  # nearest samples with this share of a sample's spacing; so many make a line
 _STRAIGHT = 0.98  # least cosine to the direction of a line
 _COMPANY = 40  # sparse samples that vote whether they are strays
@@ -36,23 +38,24 @@ _SMALL_PART, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part
 _LOOKS, _SLIGHT = 256, 0.25  # samples of a part whose wider neighbourhoods are looked at; a sheet is thinner in some
 _SHELL = 16, 0.95, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
 
-_DIRTY = 0.005  # share of strays from which on those close to the surface are looked for as well
+_DIRTY = 0.0005  # share of strays from which on those close to the surface are looked for as well
 _STRICT = 0.7  # share of the limits above that then holds for those beside a surface
 _FITTED = 20  # neighbours of the quadrics that those are measured against
-_HOVERING = 6.0  # distance from the quadric over the median one around
-_HOVERING_FAR = 0.3  # and over the local spacing
+_HOVERING = 6.0  # distance from the quadric over the largest of the medians around each neighbour
+_HOVERING_FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
 
 
 def find_outliers(points, progress=None) -> np.ndarray:
     """(n,) bool: which samples (n,3), float64 and finite, are strays.
 
     - beside a surface: lonelier than its neighbours and off their plane, or far lonelier;
+    - proud, where there are more than a few such: a little lonely and off the neighbours' plane where none of them is;
     - scattered: sparse against the whole cloud, where most sparse samples around form no surface, nor all of them one;
     - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
       as sparse, which may be a wire sampled less;
     - detached: in a small part of its own that is a cloud rather than a sheet, be it a noisy one, or the shell of a
-      convex body;
-    - hovering, in a cloud with many strays of the other kinds: far off its neighbours' quadric where they are not.
+      convex body, or that is sparse and of too few samples to tell;
+    - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
@@ -69,6 +72,9 @@ def find_outliers(points, progress=None) -> np.ndarray:
         off_wires = around.off_wires()
         if dirty or off_wires.sum() > max(_ASTRAY * len(kept), _FEW):
             found |= off_wires
+        proud = around.proud()
+        if proud.sum() > max(_MANY_PROUD * len(kept), _FEW):
+            found |= proud
         if dirty:
             found |= around.hovering(part.part(0.8, 1.0))
         stray[kept[found]] = True
@@ -117,13 +123,19 @@ class _Surroundings:
             theirs[part] = np.median(self.spacing[self.neighbours[part, 1:]], axis=1)
         theirs = np.maximum(theirs, np.finfo(float).tiny)
         self.curve = curve
-        self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5) | (curve.mean() > _WIREFRAME)
+        self.wireframe = curve.mean() > _WIREFRAME
+        self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5) | self.wireframe
         self.lonely = self.spacing / theirs
         self.off = off_plane / theirs
 
     def beside(self, share):
         off_plane = (self.lonely > share * _LONELY) & (self.off > share * _OFF)
         return (off_plane | (self.lonely > share * _ALONE)) & ~self.wire
+
+    def proud(self):
+        lonely, off, over_theirs = _PROUD
+        theirs = np.median(self.off[self.neighbours], axis=1)[self.neighbours].max(axis=1)
+        return (self.lonely > lonely) & (self.off > np.maximum(off, over_theirs * theirs)) & ~self.wire
 
     def scattered(self, progress):
         found = np.zeros(len(self.points), bool)
@@ -157,8 +169,9 @@ class _Surroundings:
 
     def hovering(self, progress):
         height = fit_quadrics(self.points, np.arange(len(self.points)), _FITTED, progress).left_out()
-        around = np.median(height[self.neighbours], axis=1)
-        return (height > np.maximum(_HOVERING * around, _HOVERING_FAR * self.spacing)) & ~self.wire
+        around = np.median(height[self.neighbours], axis=1)[self.neighbours].max(axis=1)
+        far = (height > _HOVERING_FAR * self.spacing) & (self.off > _HOVERING_FAR)
+        return far & (height > _HOVERING * around) & ~self.wire
 
     def detached(self):
         rows = np.repeat(np.arange(len(self.points)), _NEIGHBOURS)
@@ -169,7 +182,11 @@ class _Surroundings:
         count, part = connected_components(links, directed=False)
         size = np.bincount(part, minlength=count)
         thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
-        clouds = thick & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
+        sparse = (
+            np.bincount(part, weights=self.spacing > _SPARSE * np.median(self.spacing), minlength=count) > 0.5 * size
+        )
+        scanty = sparse & (size < _SHELL[0]) & ~self.wireframe
+        clouds = (thick | scanty) & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
         ends = np.cumsum(size)
         by_part = np.argsort(part, kind="stable")
         for number in np.flatnonzero(clouds & (size >= _SHELL[0])):

@@ -64,6 +64,26 @@ def test_strays_beside_the_surface_are_found():
     assert marked[~stray].mean() < 0.01
 
 
+@pytest.mark.parametrize("far", [0, 5])
+def test_few_strays_are_found_as_well(far):
+    rng = np.random.default_rng(1)
+    proud = shapes.scattered_sphere(15, seed=5) * (1 + rng.choice([-1, 1], (15, 1)) * 0.08)
+    points, stray = with_strays(np.vstack([proud, rng.uniform(1.2, 1.5, (far, 3))]))
+    np.testing.assert_array_equal(find_outliers(points), stray)
+
+
+def test_beside_edges_few_samples_go_with_strays():
+    rng = np.random.default_rng(1)
+    cube = rng.uniform(-1, 1, (8000, 3))
+    cube[np.arange(8000), rng.integers(0, 3, 8000)] = rng.choice([-1.0, 1.0], 8000)
+    assert find_outliers(np.vstack([rng.uniform(-1.3, 1.3, (20, 3)), cube]))[20:].mean() < 0.003
+
+
+def test_a_few_far_strays_are_found_though_they_lie_in_a_plane():
+    points, stray = with_strays(np.random.default_rng(1).uniform(-0.8, 0.8, (12, 3)) * [1, 1, 0] + [0, 0, 3])
+    np.testing.assert_array_equal(find_outliers(points), stray)
+
+
 @pytest.mark.parametrize("share", [0.02, 0.05, 0.2])
 def test_strays_among_wires_are_found_and_the_wires_stay(share):
     wires = edges_of_a_box(1000)
@@ -80,6 +100,11 @@ def test_of_a_sparse_wire_across_dense_ones_no_more_than_ends_go_with_strays():
     dropped = find_outliers(np.vstack([across, wires, strays]))
     assert dropped[:20].sum() <= 4  # where it touches the others
     assert dropped[1020:].mean() > 0.5
+
+
+def test_a_short_sparse_wire_of_its_own_stays_among_wires():
+    row = np.linspace([0.3, 0.3, 1.0], [0.7, 0.3, 1.0], 9)
+    assert not find_outliers(np.vstack([row, edges_of_a_box(1000)]))[:9].any()
 
 
 def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
