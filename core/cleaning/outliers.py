@@ -182,9 +182,8 @@ class _Surroundings:
         count, part = connected_components(links, directed=False)
         size = np.bincount(part, minlength=count)
         thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
-        sparse = (
-            np.bincount(part, weights=self.spacing > _SPARSE * np.median(self.spacing), minlength=count) > 0.5 * size
-        )
+        sparse = self.spacing > _SPARSE * np.median(self.spacing)
+        sparse = np.bincount(part, weights=sparse, minlength=count) > 0.5 * size
         scanty = sparse & (size < _SHELL[0]) & ~self.wireframe
         clouds = (thick | scanty) & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
         ends = np.cumsum(size)
