@@ -70,10 +70,10 @@ def find_outliers(points, progress=None) -> np.ndarray:
         part(0.7)
         found |= around.detached()
         off_wires = around.off_wires()
-        if dirty or off_wires.sum() > max(_ASTRAY * len(kept), _FEW):
+        if dirty or _many(off_wires, _ASTRAY):
             found |= off_wires
         proud = around.proud()
-        if proud.sum() > max(_MANY_PROUD * len(kept), _FEW):
+        if _many(proud, _MANY_PROUD):
             found |= proud
         if dirty:
             found |= around.hovering(part.part(0.8, 1.0))
@@ -91,6 +91,10 @@ def remove_outliers(points, progress=None) -> tuple[np.ndarray, np.ndarray]:
     points = finite_points(points)
     kept = np.flatnonzero(~find_outliers(points, progress))
     return points[kept], kept
+
+
+def _many(found, share):
+    return found.sum() > max(share * len(found), _FEW)
 
 
 class _Surroundings:
@@ -122,6 +126,7 @@ class _Surroundings:
         for part in progress.part(0.9, 1.0).chunks(n, _CHUNK):
             theirs[part] = np.median(self.spacing[self.neighbours[part, 1:]], axis=1)
         theirs = np.maximum(theirs, np.finfo(float).tiny)
+        self.sparse = self.spacing > _SPARSE * np.median(self.spacing)
         self.curve = curve
         self.wireframe = curve.mean() > _WIREFRAME
         self.wire = curve | (curve[self.neighbours[:, 1:]].mean(axis=1) > 0.5) | self.wireframe
@@ -134,12 +139,19 @@ class _Surroundings:
 
     def proud(self):
         lonely, off, over_theirs = _PROUD
-        theirs = np.median(self.off[self.neighbours], axis=1)[self.neighbours].max(axis=1)
-        return (self.lonely > lonely) & (self.off > np.maximum(off, over_theirs * theirs)) & ~self.wire
+        found = (self.lonely > lonely) & (self.off > off) & ~self.wire
+        return self._stands_out(found, self.off, over_theirs)
+
+    def _stands_out(self, found, height, times):
+        """Which of the samples `found` have so many times the largest of the median heights around each neighbour."""
+        row = np.flatnonzero(found)
+        theirs = np.median(height[self.neighbours[self.neighbours[row]]], axis=2).max(axis=1)
+        found[row] = height[row] > times * theirs
+        return found
 
     def scattered(self, progress):
         found = np.zeros(len(self.points), bool)
-        sparse = np.flatnonzero(self.spacing > _SPARSE * np.median(self.spacing))
+        sparse = np.flatnonzero(self.sparse)
         if not len(sparse):
             return found
         astray = (self.thickness > _THICK) | ((self.off > _OFF) & ~self.wire)
@@ -169,9 +181,8 @@ class _Surroundings:
 
     def hovering(self, progress):
         height = fit_quadrics(self.points, np.arange(len(self.points)), _FITTED, progress).left_out()
-        around = np.median(height[self.neighbours], axis=1)[self.neighbours].max(axis=1)
         far = (height > _HOVERING_FAR * self.spacing) & (self.off > _HOVERING_FAR)
-        return far & (height > _HOVERING * around) & ~self.wire
+        return self._stands_out(far & ~self.wire, height, _HOVERING)
 
     def detached(self):
         rows = np.repeat(np.arange(len(self.points)), _NEIGHBOURS)
@@ -181,9 +192,10 @@ class _Surroundings:
         links = coo_matrix((joined[joined], (rows[joined], columns[joined])), shape=(len(self.points),) * 2)
         count, part = connected_components(links, directed=False)
         size = np.bincount(part, minlength=count)
-        thick = np.bincount(part, weights=self.thickness > _THICK, minlength=count) > 0.5 * size
-        sparse = self.spacing > _SPARSE * np.median(self.spacing)
-        sparse = np.bincount(part, weights=sparse, minlength=count) > 0.5 * size
+        thick, sparse = (
+            np.bincount(part, weights=samples, minlength=count) > 0.5 * size
+            for samples in (self.thickness > _THICK, self.sparse)
+        )
         scanty = sparse & (size < _SHELL[0]) & ~self.wireframe
         clouds = (thick | scanty) & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
         ends = np.cumsum(size)
