@@ -36,6 +36,7 @@ _MAJORITY = 0.6
 _DETACHED = 4.0  # a gap this many times the local spacing on either side separates parts
 _SMALL_PART, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part
 _LOOKS, _SLIGHT = 256, 0.25  # samples of a part whose wider neighbourhoods are looked at; a sheet is thinner in some
+_SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where so many times as sparse as the cloud
 _SHELL = 16, 0.95, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
 
 _DIRTY = 0.0005  # share of strays from which on those close to the surface are looked for as well
@@ -192,15 +193,17 @@ class _Surroundings:
         links = coo_matrix((joined[joined], (rows[joined], columns[joined])), shape=(len(self.points),) * 2)
         count, part = connected_components(links, directed=False)
         size = np.bincount(part, minlength=count)
-        thick, sparse = (
+        fewest, times = _SCANTY
+        sparser = self.spacing > times * np.median(self.spacing)
+        thick, sparse, sparser, wires = (
             np.bincount(part, weights=samples, minlength=count) > 0.5 * size
-            for samples in (self.thickness > _THICK, self.sparse)
+            for samples in (self.thickness > _THICK, self.sparse, sparser, self.wire)
         )
-        scanty = sparse & (size < _SHELL[0]) & ~self.wireframe
+        scanty = (sparse & (size < _SHELL[0]) | sparser & (size < fewest) & ~wires) & ~self.wireframe
         clouds = (thick | scanty) & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
         ends = np.cumsum(size)
         by_part = np.argsort(part, kind="stable")
-        for number in np.flatnonzero(clouds & (size >= _SHELL[0])):
+        for number in np.flatnonzero(clouds & ~scanty & (size >= _SHELL[0])):
             row = by_part[ends[number] - size[number] : ends[number]]
             sheet = _is_sheet(self.points[row]) or _is_shell(self.points[row], self.spacing[row])
             clouds[number] = not sheet

@@ -34,6 +34,8 @@ THIN_BUT_REAL = {
     "close sheets": shapes.sheets(1500, gap=0.05),
     "two apart": np.vstack([shapes.scattered_sphere(2000), 0.3 * shapes.scattered_sphere(500) + 40]),
     "a small part": np.vstack([shapes.scattered_sphere(3000), 0.05 * shapes.scattered_sphere(50) + [1.3, 0, 0]]),
+    "a sparse sheet of its own": np.vstack([shapes.scattered_sphere(3000), 0.55 * shapes.square(36) + [0, 0, 2]]),
+    "a sparse wire of its own": np.vstack([shapes.scattered_sphere(3000), np.linspace([-5, 0, 2], [5, 0, 2], 30)]),
     "four points": np.vstack([np.eye(3), np.zeros((1, 3))]),
 }
 
@@ -79,8 +81,9 @@ def test_beside_edges_few_samples_go_with_strays():
     assert find_outliers(np.vstack([rng.uniform(-1.3, 1.3, (20, 3)), cube]))[20:].mean() < 0.003
 
 
-def test_a_few_far_strays_are_found_though_they_lie_in_a_plane():
-    points, stray = with_strays(np.random.default_rng(1).uniform(-0.8, 0.8, (12, 3)) * [1, 1, 0] + [0, 0, 3])
+@pytest.mark.parametrize("count", [12, 30])
+def test_a_few_far_strays_are_found_though_they_lie_in_a_plane(count):
+    points, stray = with_strays(np.random.default_rng(1).uniform(-0.8, 0.8, (count, 3)) * [1, 1, 0] + [0, 0, 3])
     np.testing.assert_array_equal(find_outliers(points), stray)
 
 
