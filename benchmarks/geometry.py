@@ -18,17 +18,31 @@ def closest_faces(x: np.ndarray, mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(squared), face
 
 
+def first_hits(eye: np.ndarray, directions: np.ndarray, mesh: Mesh) -> np.ndarray:
+    """Distance (m,) from `eye` (3,) to the first triangle along unit directions (m,3); inf where there is none."""
+    vertices, faces, tree = _with_tree(mesh)
+    eyes = np.tile(np.asarray(eye, float), (len(directions), 1))
+    face, distance, _ = tree.intersect_ray_first(vertices, faces, eyes, directions)
+    return np.where(face < 0, np.inf, distance)
+
+
 _trees = []  # (mesh, faces, tree) of the last two asked for: building the truth's anew each time would show
 
 
 def _closest(x, mesh):
-    """Squared distance, triangle and nearest point, by libigl's tree."""
+    """Squared distance, triangle and nearest point."""
+    vertices, faces, tree = _with_tree(mesh)
+    return tree.squared_distance(vertices, faces, x)
+
+
+def _with_tree(mesh):
+    """Vertices, faces and libigl's tree of them."""
     known = next((entry for entry in _trees if entry[0] is mesh), None)
     if known is None:
         known = mesh, mesh.faces.astype(np.int64), igl.AABB()
         known[2].init(mesh.vertices, known[1])
     _trees[:] = [known, *(entry for entry in _trees if entry is not known)][:2]
-    return known[2].squared_distance(mesh.vertices, known[1], x)
+    return mesh.vertices, *known[1:]
 
 
 def surface_points(mesh: Mesh, count: int, rng: np.random.Generator) -> np.ndarray:

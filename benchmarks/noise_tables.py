@@ -36,7 +36,7 @@ def surfaces(rows):
     ways = {"ours": "here", "alternating": "alternation", "jet": "jet, front", "poisson": "Poisson"}
     yield "case", "noise %", *ways.values()
     for row in rows:
-        yield row["case"], f"{row['percent']:g}", *_cd_and_hd(row, ways)
+        yield row["case"], f"{row['percent']:g}", *cells(row, ways)
 
 
 def halves(rows):
@@ -117,7 +117,7 @@ def faint(rows):
 def by_level(rows, what):
     yield "case", f"{what}, local spacings", "moved", "here", "`denoise=0`", "`denoise=1`"
     for row in rows:
-        yield row["case"], f"{row['level']:g}", f"{row['moved']:.0%}", *_cd_and_hd(row, ("ours", "none", "every"))
+        yield row["case"], f"{row['level']:g}", f"{row['moved']:.0%}", *cells(row, ("ours", "none", "every"))
 
 
 def wires(rows):
@@ -131,10 +131,11 @@ def wires(rows):
 def uneven(rows):
     yield "shape", "points", "here", f"bridge {noise_uneven.BRIDGE:g}", "Poisson"
     for row in rows:
-        yield row["shape"], f"{row['points']:,}", *_cd_and_hd(row, ("ours", "bridged", "poisson"))
+        yield row["shape"], f"{row['points']:,}", *cells(row, ("ours", "bridged", "poisson"))
 
 
-def _cd_and_hd(row, ways):
+def cells(row, ways):
+    """CD (HD) of each of the ways; a dash where there are none."""
     return (f"{row[way]['cd']:.3f} ({row[way]['hd']:.0f})" if way in row else "–" for way in ways)
 
 

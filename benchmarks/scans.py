@@ -1,0 +1,198 @@
+"""docs/scans.md: `python -m benchmarks.scans` reconstructs what scanners make of known shapes, and writes the page."""
+
+import argparse
+import platform
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from core import Settings, reconstruct
+from core.io.atomic import atomic_path, writable_folder
+from core.io.report import write_report
+
+from .catalogue import CASES
+from .geometry import closest_points, surface_points
+from .noise_measure import by_peer, cd_and_hd
+from .noise_tables import cells, markdown
+from .peers import check_open3d, poisson
+from .pictures import View, caption, draw_points, draw_surface, save, sheet
+from .scanners import IMAGES, JUMP, SHARE, depth_images, seen_from_one_spot
+from .shapes import rooms
+from .status import DONE, exit_status, said
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+SHAPES = ("bumps_10k", "box_10k", "tangle_10k", "knot_10k", "candy_10k", "hemisphere_2k", "cloth_10k", "mask_5k")
+POINTS = 20_000
+FAR = 0.008  # distance from the surface from which on a flying point is far from it, a hundredth of the longest side
+ROOM_POINTS = 30_000, 120_000
+ROOM_NOISE = 0.0, 0.1, 0.3  # per cent of the longest side
+FILTER = 20, 2.0  # neighbours and standard deviations of Open3D's statistical filter
+
+_FEET = 100_000
+_PIXELS = 480
+_LIBRARIES = "numpy", "scipy", "open3d"
+
+_PAGE = """\
+# Scans
+
+Made by `python -m benchmarks.scans`, which takes the scans, writes this page, its picture and the numbers behind it
+([numbers.json](scans/numbers.json)); do not edit it by hand. {versions}.
+Every row is one run with default settings. Distances × 10³, the longest side of a true shape is 0.8.
+
+![Points and surfaces of depth images and of a room](scans/scans.png)
+
+## Depth images with flying points
+
+{images} depth images all around, {points:,} points together, as one cloud. At silhouettes, where another part of the
+shape is more than {jump:g} pixels behind, {share:.0%} of the pixels see both and give a point somewhere between: a
+flying point. *far*: share of all points that fly, at {far:g} or more from the surface. *found*: share of those that is
+dropped. *lost*: share of the points that do not fly that is dropped with them.
+
+CD (HD) of the surface; of that with `outliers=False`; of that of the points that do not fly; and of Open3D's Poisson
+(PCA normals over 30 neighbours, oriented, depth 8), which closes what is open, of the points that its statistical
+filter leaves ({neighbours} neighbours, {deviations:g} deviations). What no image shows counts as missing in all.
+
+{shapes}
+
+## A room from one spot
+
+A scanner above the table of a furnished room takes points at equal angles, with Gaussian noise along its rays in per
+cent of the longest side. What is close to it has points much closer together than the noise moves them. *dropped*:
+points taken for strays; there are none. *to the surface*: from what was seen, without the noise; *to the truth*: from
+the surface. Means (largest).
+
+{rooms}
+"""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run on `arguments` (default: those of the process) and return the exit status."""
+    argparse.ArgumentParser(
+        prog="python -m benchmarks.scans",
+        description="Reconstruct what scanners make of known shapes and write docs/scans.md.",
+        epilog="exit status: 0 done, 2 bad input (one line says what), 130 cancelled",
+    ).parse_args(arguments)
+
+    def command():
+        print(f"wrote {write_page(measure(), DOCS)}")
+        picture(DOCS / "scans" / "scans.png")
+        return DONE
+
+    return exit_status(command)
+
+
+def measure() -> dict:
+    """Everything that the page shows, printing what is done as it finishes."""
+    check_open3d()
+    scans = [(count, noise) for count in ROOM_POINTS for noise in ROOM_NOISE]
+    return {
+        "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+        "images": [said(name, measure_images(name)) for name in SHAPES],
+        "rooms": [said(f"room, {count:,} points, {noise:g} %", measure_room(count, noise)) for count, noise in scans],
+    }
+
+
+def measure_images(name: str, count: int = POINTS) -> dict:
+    """What becomes of a shape's depth images, see `docs/scans.md`. A peer that crashes is left out."""
+    truth = CASES[name].surface().mesh
+    points, flying = depth_images(truth, count, np.random.default_rng(0))
+    result = reconstruct(points)
+    kept = np.zeros(len(points), bool)
+    kept[result.source_index] = True
+    far = flying & (closest_points(points, truth)[0] >= FAR)
+    peer = by_peer(_filtered_poisson, points, truth)
+    return {
+        "shape": name,
+        "points": len(points),
+        "flying": flying.mean(),
+        "far": far.mean(),
+        "found": 1.0 - kept[far].mean() if far.any() else None,
+        "lost": 1.0 - kept[~flying].mean(),
+        "ours": cd_and_hd(result.surface, truth),
+        "all": cd_and_hd(reconstruct(points, Settings(outliers=False)).surface, truth),
+        "none": cd_and_hd(reconstruct(points[~flying]).surface, truth),
+        **({"poisson": peer} if peer else {}),
+    }
+
+
+def _filtered_poisson(points, truth):
+    import open3d
+
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    kept = cloud.remove_statistical_outlier(*FILTER)[1]
+    return cd_and_hd(poisson(points[np.asarray(kept)])[0], truth)
+
+
+def measure_room(count: int, percent: float) -> dict:
+    """What becomes of a scan of the room, see `docs/scans.md`."""
+    truth = rooms.room().mesh
+    points, seen = seen_from_one_spot(truth, count, percent, np.random.default_rng(0))
+    result = reconstruct(points)
+    feet = surface_points(result.surface, _FEET, np.random.default_rng(0))
+    ways = {"to_surface": (seen, result.surface), "to_truth": (feet, truth)}
+    off = {name: 1e3 * closest_points(*way)[0] for name, way in ways.items()}
+    return {
+        "points": len(points),
+        "percent": percent,
+        "dropped": result.report["cleaning"]["outliers"],
+        **{name: {"mean": found.mean(), "max": found.max()} for name, found in off.items()},
+    }
+
+
+def write_page(measured: dict, docs: Path) -> Path:
+    """Write scans.md and the numbers into the folder `docs`. Returns the page."""
+    write_report(writable_folder(docs / "scans") / "numbers.json", measured)
+    page = docs / "scans.md"
+    text = _PAGE.format(
+        versions=", ".join(f"{name} {number}" for name, number in measured["versions"].items()),
+        images=IMAGES,
+        points=POINTS,
+        jump=JUMP,
+        share=SHARE,
+        far=1e3 * FAR,
+        neighbours=FILTER[0],
+        deviations=FILTER[1],
+        shapes=markdown(_shapes(measured["images"])),
+        rooms=markdown(_rooms(measured["rooms"])),
+    )
+    with atomic_path(page) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return page
+
+
+def _shapes(rows):
+    yield "shape", "far", "found", "lost", "here", "all points", "none flying", "filter, Poisson"
+    for row in rows:
+        found = "–" if row["found"] is None else f"{row['found']:.1%}"
+        ways = cells(row, ("ours", "all", "none", "poisson"))
+        yield row["shape"], f"{row['far']:.2%}", found, f"{row['lost']:.2%}", *ways
+
+
+def _rooms(rows):
+    yield "points", "noise, %", "dropped", "to the surface", "to the truth"
+    for row in rows:
+        off = (f"{row[way]['mean']:.2f} ({row[way]['max']:.0f})" for way in ("to_surface", "to_truth"))
+        yield f"{row['points']:,}", f"{row['percent']:g}", f"{row['dropped']:,}", *off
+
+
+def picture(path: Path) -> Path:
+    """Points and surfaces of the tangle's depth images and of the noisiest scan of the room."""
+    figure, panels = sheet(1, 4)
+    tangle = depth_images(CASES["tangle_10k"].surface().mesh, POINTS, np.random.default_rng(0))[0]
+    room = seen_from_one_spot(rooms.room().mesh, ROOM_POINTS[-1], ROOM_NOISE[-1], np.random.default_rng(0))[0]
+    given = (
+        ("depth images of a tangle", tangle, View()),
+        ("a room from one spot", room, View((0.5, -1.0, 0.9))),
+    )
+    for (left, right), (name, points, view) in zip(panels.reshape(2, 2), given, strict=True):
+        camera = view.camera(points, _PIXELS)
+        draw_points(left, points, camera)
+        caption(left, name, f"{len(points):,} points")
+        draw_surface(right, reconstruct(points).surface, camera, view)
+    return save(figure, path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,111 @@
+"""Scans of shapes whose visible parts are known, and the page on made-up numbers."""
+
+import json
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("igl")
+
+from benchmarks import scans
+from benchmarks.geometry import closest_points
+from benchmarks.metrics import surface_errors
+from benchmarks.scanners import EYE, IMAGES, depth_images, seen_from_one_spot
+from benchmarks.scans import ROOM_NOISE, ROOM_POINTS, SHAPES, measure_images, measure_room, write_page
+from benchmarks.shapes import closed, rooms
+from core import Mesh
+
+
+def two_squares(gap):
+    """A large one at z = 0, a small one `gap` above it."""
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    return Mesh(np.vstack([corners, 0.4 * corners + [0, 0, gap]]), np.vstack([faces, faces + 4]).astype(np.int32))
+
+
+def test_points_of_depth_images_lie_on_what_is_seen_and_those_that_fly_between():
+    mesh = two_squares(0.6)
+    points, flying = depth_images(mesh, 5000, np.random.default_rng(0))
+    distance = closest_points(points, mesh)[0]
+    assert len(points) == pytest.approx(5000, rel=0.1)
+    assert distance[~flying].max() < 1e-6
+    assert (distance[flying] > 0.01).mean() > 0.7
+    assert ((points[flying, 2] > -0.1) & (points[flying, 2] < 0.7)).all()  # grazing rays see a plane's own slope jump
+    assert ((points[flying, 2] > 0.1) & (points[flying, 2] < 0.5)).mean() > 0.1
+    assert 0.002 < flying.mean() < 0.1
+
+
+def test_a_box_is_seen_all_around_and_nothing_flies_outside():
+    mesh = closed.cube().mesh
+    points, _ = depth_images(mesh, 4000, np.random.default_rng(0))
+    assert np.abs(points).max() < 0.4 + 1e-6
+    axis = np.abs(points).argmax(axis=1)
+    side = np.take_along_axis(points, axis[:, None], 1)[:, 0] > 0
+    assert np.bincount(2 * axis + side, minlength=6).min() > 4000 / 6 / 2
+
+
+def test_a_scan_from_one_spot_sees_each_ray_once_and_its_noise_is_along_rays():
+    mesh = rooms.room().mesh
+    points, seen = seen_from_one_spot(mesh, 3000, 1.0, np.random.default_rng(0))
+    assert len(seen) == pytest.approx(3000, rel=0.1)
+    assert closest_points(seen, mesh)[0].max() < 1e-6
+    rays = seen - EYE
+    depth = np.linalg.norm(rays, axis=1)
+    off = np.einsum("ni,ni->n", points - seen, rays / depth[:, None])
+    assert np.linalg.norm(points - seen - off[:, None] * rays / depth[:, None], axis=1).max() < 1e-9
+    assert off.std() == pytest.approx(0.01 * np.ptp(mesh.vertices, axis=0).max(), rel=0.1)
+
+
+@pytest.fixture
+def crossing(monkeypatch):
+    """A small square above a large one in place of the shapes, peers that crash, and a coarse grid."""
+    mesh = two_squares(0.6)
+    surface = SimpleNamespace(mesh=mesh)
+    monkeypatch.setattr(scans, "CASES", {"squares": SimpleNamespace(surface=lambda: surface)})
+    monkeypatch.setattr(scans, "by_peer", lambda *_: {})
+    monkeypatch.setattr(scans, "cd_and_hd", partial(few_errors, count=2000))
+    return mesh
+
+
+def few_errors(mesh, truth, count):
+    errors = surface_errors(mesh, truth, count=count)
+    return {"cd": errors["cd"], "hd": errors["hd"]}
+
+
+def test_flying_points_found_and_points_lost_are_counted(crossing):
+    row = measure_images("squares", 6000)
+    assert row["found"] > 0.8
+    assert row["lost"] < 0.01
+    assert row["none"]["cd"] <= row["ours"]["cd"] < row["all"]["cd"]
+    assert "poisson" not in row
+
+
+def test_of_a_noisy_room_next_to_nothing_is_dropped_and_what_is_seen_is_near_the_surface():
+    row = measure_room(8000, 0.1)
+    assert row["dropped"] < 8
+    assert row["to_surface"]["mean"] < row["to_truth"]["mean"] < 3
+
+
+def made_up():
+    errors = {"cd": 0.5, "hd": 9.0}
+    ways = {"ours": errors, "all": {"cd": 5.0, "hd": 90.0}, "none": errors, "poisson": {"cd": 2.5, "hd": 70.0}}
+    row = {"points": 100, "flying": 0.05, "far": 0.0125, "found": 0.99, "lost": 0.002, **ways}
+    images = [{"shape": name, **row} for name in SHAPES]
+    images[1]["found"] = None
+    del images[1]["poisson"]
+    off = {"to_surface": {"mean": 0.25, "max": 4.0}, "to_truth": {"mean": 0.5, "max": 6.0}}
+    rooms = [{"points": n, "percent": p, "dropped": 3, **off} for n in ROOM_POINTS for p in ROOM_NOISE]
+    return {"versions": {"Python": "3.11"}, "images": images, "rooms": rooms}
+
+
+def test_page_holds_every_row(tmp_path):
+    measured = made_up()
+    page = write_page(measured, tmp_path).read_text()
+    assert f"| {SHAPES[0]} | 1.25% | 99.0% | 0.20% | 0.500 (9) | 5.000 (90) | 0.500 (9) | 2.500 (70) |" in page
+    assert f"| {SHAPES[1]} | 1.25% | – | 0.20% | 0.500 (9) | 5.000 (90) | 0.500 (9) | – |" in page
+    assert "| 30,000 | 0.1 | 3 | 0.25 (4) | 0.50 (6) |" in page
+    assert f"{IMAGES} depth images" in page
+    assert json.loads((tmp_path / "scans" / "numbers.json").read_text()) == measured
