@@ -68,7 +68,7 @@ def reconstruct(
 def _reconstruct(points, settings, constraints, normals, progress):
     stages = _Stages()
     with stages("points"):
-        samples = prepare_samples(points, progress.part(0.0, 0.01, "points"))
+        samples = prepare_samples(points, progress.part(0.0, 0.01, "points")).in_spatial_order()
         given = len(np.asarray(points))
 
     with stages("cleaning"):
@@ -123,11 +123,12 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "warnings": [*samples.warnings, *ignored, *large, *_too_coarse(spacing, grid), *surfaces.warnings],
     }
     progress(1.0)
+    row = samples.given_order()
     return Reconstruction(
-        points=samples.given,
-        source_index=samples.source_index,
-        normals=normals,
-        confidence=confidence,
+        points=samples.given[row],
+        source_index=samples.source_index[row],
+        normals=normals[row],
+        confidence=confidence[row],
         field=_field(surfaces, near, feet, grid, samples, settings.band),
         surface=surfaces.meshes.get("double", surfaces.meshes.get("signed")),
         sheet=surfaces.meshes.get("single"),
@@ -159,7 +160,8 @@ def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
 
 def _field(surfaces, near, feet, grid, samples, band):
     """The field in the input's units."""
-    near = replace(near, step=near.step * samples.scale)
+    place = np.argsort(samples.given_order()).astype(np.int32)
+    near = replace(near, step=near.step * samples.scale, sample=place[near.sample])
     origin, cell = samples.to_input_units(grid.origin), grid.spacing * samples.scale
     sdf, scale = "signed" in surfaces.meshes, np.float32(samples.scale)
     if band is None:

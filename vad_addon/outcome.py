@@ -167,16 +167,18 @@ def _begun(task, folder, progress):
     """The first stages alone."""
     start = time.perf_counter()
     share = 1.0 if task.until == CLEANING else 0.5
-    samples, report = clean(prepare_samples(task.points), task.settings, progress.part(0.0, share, "cleaning"))
+    samples = prepare_samples(task.points).in_spatial_order()
+    samples, report = clean(samples, task.settings, progress.part(0.0, share, "cleaning"))
     spacing = local_spacing(samples.points)
-    normals, confidence, ignored = None, None, ()
+    row, normals, confidence, ignored = samples.given_order(), None, None, ()
     if task.until == NORMALS:
         constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
         part = progress.part(share, 1.0, "normals")
         normals, confidence, _ = estimate_normals(samples.points, spacing, task.settings, constraints, part)
+        normals, confidence = normals[row], confidence[row]
     return Outcome(
-        points=samples.given,
-        source_index=samples.source_index,
+        points=samples.given[row],
+        source_index=samples.source_index[row],
         normals=normals,
         confidence=confidence,
         surface=None,
