@@ -7,7 +7,7 @@ from ..normals.mirrors import Mirrors
 from ..normals.reflection import reflection_sweeps
 from ..progress import Progress
 from ..voronoi.facets import voronoi_facets
-from .anchors import SMOOTHING, nearest_anchor
+from .anchors import SMOOTHING, nearest_anchor, some_samples
 from .roughness import least_part, roughness
 
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
@@ -73,7 +73,7 @@ def _typical_agreement(points, spacing, seed, progress):
     which is within .011 of it on eight clouds of 5,000 to 20,000, with and without noise."""
     if len(points) <= _PATCHES * _PATCH:
         return np.median(_agreement(points, spacing, progress))
-    centres = np.random.default_rng(seed).choice(len(points), _PATCHES, replace=False)
+    centres = some_samples(points, _PATCHES, seed)
     patch = KDTree(points).query(points[centres], k=_PATCH)[1]
     rows = np.unique(patch)
     confidence = _agreement(points[rows], spacing[rows], progress)
