@@ -41,7 +41,7 @@ def test_an_open_box_is_one_sheet_with_sharp_edges(n, seed):
 
 
 def test_its_rim_is_where_the_samples_end():
-    points, turn = box(8000, 1)
+    points, turn = box(8000, 3)
     sheet = single(points).sheet
     edges, counts = sheet.edge_counts()
     rim = sheet.vertices[np.unique(edges[counts == 1])] @ turn
