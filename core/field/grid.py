@@ -23,9 +23,9 @@ class Grid:
         return self.origin + self.spacing * np.stack(np.unravel_index(flat_index, self.shape), axis=1)
 
     def nearest_nodes(self, x: np.ndarray) -> np.ndarray:
-        """Flat index of the node nearest to each point inside the box, (m,3) -> (m,)."""
+        """Flat index of the node nearest to each point, (m,3) -> (m,)."""
         cells = np.rint((x - self.origin) / self.spacing).astype(np.int64)
-        return np.ravel_multi_index(cells.T, self.shape)
+        return np.ravel_multi_index(np.clip(cells, 0, np.array(self.shape) - 1).T, self.shape)
 
 
 def padding_cells(resolution: int) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..field.blocks import Blocks, at_nodes
+from ..field.blocks import Blocks
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
@@ -15,6 +15,7 @@ from .first_steps import first_steps
 from .mesh import Mesh, edge_numbers, in_use
 from .pieces import pieces_with_samples
 from .settling import settled
+from .thin_parts import find_thin_parts
 from .triangles import mesh_of
 from .zero_set import sharpened, zero_set
 
@@ -28,10 +29,10 @@ def open_sheet(values: np.ndarray | Blocks, band: NearBand, surface: LocalSurfac
     which may be changed, on its foot points and without what is past its rims: two faces at each edge or one, wound
     alike, with ragged borders."""
     progress, cell = Progress.of(progress), grid.spacing
-    vertices, faces = zero_set(values, surface, grid, progress.part(0.0, 0.2))
-    node = grid.nearest_nodes(np.clip(vertices, grid.origin, grid.origin + cell * (np.array(grid.shape) - 1)))
-    near = np.abs(at_nodes(values, node)) <= _NEAR * cell
-    vertices, faces = in_use(vertices, faces[near[faces].all(axis=1)])
+    thin = find_thin_parts(values, surface, grid, progress.part(0.0, 0.1))
+    if thin:  # past a rim distances are those to the sheet continued, which is no place to lift it
+        thin = thin.away_from(grid.positions(band.node[band.past_rim]))
+    vertices, faces = zero_set(values, thin, surface, grid, progress.part(0.1, 0.2), _NEAR * cell)
     vertices, faces = _trimmed(vertices, faces, band, surface, grid, progress.part(0.2, 0.4))
     vertices = evened(vertices, faces)
     step = surface.project(vertices, progress.part(0.4, 0.7)).step

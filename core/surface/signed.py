@@ -18,6 +18,7 @@ from .mesh import Mesh
 from .pieces import pieces_with_samples
 from .settling import settled
 from .sides import Sides
+from .thin_parts import find_thin_parts
 from .triangles import mesh_of
 from .zero_set import sharpened, zero_set
 
@@ -47,7 +48,8 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
     values = each(lambda u: np.clip(u, -limit, limit), values)
-    vertices, faces = zero_set(values, surface, grid, progress.part(0.0, 0.2))
+    thin = find_thin_parts(values, surface, grid, progress.part(0.0, 0.1))
+    vertices, faces = zero_set(values, thin, surface, grid, progress.part(0.1, 0.2))
     vertices = evened(vertices, faces)
     found = surface.project(vertices, progress.part(0.2, 0.7))
     on = found.distance <= grid.spacing

@@ -37,6 +37,14 @@ class ThinParts:
                 lift += sign * _LEVEL * self.cell * np.clip((_END - away) / (_END - _FULL), 0.0, 1.0)
         return lift
 
+    def away_from(self, places: np.ndarray) -> "ThinParts | None":
+        """Those whose lift ends before it reaches any of the places (m,3); None where there are none."""
+        if not len(places):
+            return self
+        tree, end = KDTree(places), _END * self.cell
+        thin, slits = (x[tree.query(x, distance_upper_bound=end)[0] > end] for x in (self.thin, self.slits))
+        return ThinParts(thin, slits, self.cell) if len(thin) + len(slits) else None
+
     def lower(self, values: np.ndarray | Blocks, grid: Grid) -> None:
         """Take the lift off signed distances (nx,ny,nz) float32 or Blocks, in place, where the surface is near."""
         limit = np.float32(_NEAR * self.cell)

@@ -4,33 +4,42 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..field.blocks import Blocks
+from ..field.blocks import Blocks, at_nodes
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
 from .corners import into_corners
 from .evening import FLAT, vertex_normals
 from .isosurface import isosurface
-from .mesh import Mesh
-from .thin_parts import find_thin_parts
+from .mesh import Mesh, in_use
+from .thin_parts import ThinParts
 
 _ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
 _INTO = 1.5  # cells, how far a vertex may go into a crease
 
 
 def zero_set(
-    values: np.ndarray | Blocks, surface: LocalSurface, grid: Grid, progress: Progress
+    values: np.ndarray | Blocks,
+    thin: ThinParts | None,
+    surface: LocalSurface,
+    grid: Grid,
+    progress: Progress,
+    within: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (v,3) and quads or triangles (f,4) or (f,3) of the zero set of signed distances (nx,ny,nz) float32 or
-    Blocks, which may be changed: near parts that the signs of nodes do not show (see :mod:`.thin_parts`) they start off
-    the surface and are pulled in, as those of a double cover."""
-    if thin := find_thin_parts(values, surface, grid, progress.part(0.0, 0.5)):
+    Blocks, which may be changed: at thin parts, which the signs of nodes do not show, they start off the surface and
+    are pulled in, as those of a double cover. Only where the nodes nearest to the vertices are `within` that distance:
+    where distances end, there is no surface."""
+    if thin:
         thin.lower(values, grid)
     cells, faces = isosurface(values, 0.0)
     vertices = grid.origin + grid.spacing * cells
+    if np.isfinite(within):
+        near = np.abs(at_nodes(values, grid.nearest_nodes(vertices))) <= within
+        vertices, faces = in_use(vertices, faces[near[faces].all(axis=1)])
     if thin:
         lifted = np.flatnonzero(thin.lift(vertices))
-        vertices[lifted] -= surface.project(vertices[lifted], progress.part(0.5, 1.0)).step
+        vertices[lifted] -= surface.project(vertices[lifted], progress).step
     return vertices, faces
 
 

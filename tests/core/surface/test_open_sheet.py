@@ -40,6 +40,13 @@ def test_an_open_box_is_one_sheet_with_sharp_edges(n, seed):
     assert np.median(to_edge) < 0.5
 
 
+@pytest.mark.parametrize(("n", "seed"), [(8000, 2), (8000, 6), (8000, 9)])
+def test_an_open_box_has_no_holes_along_its_edges(n, seed):
+    """Corners that no node lies in were taken for thin parts, and what is off such parts for the end of the sheet."""
+    sheet = single(box(n, seed)[0]).sheet
+    assert (shapes.euler(sheet), sheet.border_loops()) == (1, 1)
+
+
 def test_its_rim_is_where_the_samples_end():
     points, turn = box(8000, 3)
     sheet = single(points).sheet

@@ -101,3 +101,12 @@ def test_a_slit_narrower_than_a_cell_is_kept():
     assert run.field.spacing > 0.05
     assert (KDTree(run.surface.vertices).query(run.points)[0] > run.field.spacing).mean() < 0.01
     assert set(run.surface.edge_counts()[1]) == {2}
+
+
+def test_thin_parts_away_from_places_are_left():
+    parts = ThinParts(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[0.0, 9, 0]]), 1.0)
+    assert parts.away_from(np.empty((0, 3))) is parts
+    left = parts.away_from(np.array([[3.9, 0, 0], [0, 9, 4.1]]))
+    np.testing.assert_array_equal(left.thin, [[9, 0, 0]])
+    np.testing.assert_array_equal(left.slits, [[0, 9, 0]])
+    assert parts.away_from(np.array([[0, 0, 1.0], [9, 0, 1], [0, 9, 1]])) is None
