@@ -34,7 +34,7 @@ _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
 _NEAR_NODE, _NODE = 2.4e-6, 5e-8
 _BAND_NEAR_NODE, _BAND_NODE = 4.8e-6, 1.5e-6
 _COVER, _SIDES = 2.9e-5, 5.6e-5  # for a squared cell of the surface: its double cover, and one with its sides told
-_PROBE = 0.00387
+_PROBE = 0.0042
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
