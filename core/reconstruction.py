@@ -13,7 +13,7 @@ class Reconstruction:
     """Everything a run found, in the input's units.
 
     points       : (n',3) float64 samples used
-    source_index : (n',) int64, row of each sample in the input
+    source_index : (n',) int64, row of each sample in the input, ascending
     normals      : (n',3) float64 unit axes; the sign carries no meaning
     confidence   : (n',) float64 in [0,1], how well the neighbours agree on the axis
     field        : DistanceField, or BandedField where the setting `band` is given; signed where `surface` is "signed"
