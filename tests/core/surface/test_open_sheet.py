@@ -40,9 +40,10 @@ def test_an_open_box_is_one_sheet_with_sharp_edges(n, seed):
     assert np.median(to_edge) < 0.5
 
 
-@pytest.mark.parametrize(("n", "seed"), [(8000, 2), (8000, 6), (8000, 9)])
+@pytest.mark.parametrize(("n", "seed"), [(6000, 4), (8000, 2), (8000, 6), (8000, 9)])
 def test_an_open_box_has_no_holes_along_its_edges(n, seed):
-    """Corners that no node lies in were taken for thin parts, and what is off such parts for the end of the sheet."""
+    """Corners that no node lies in were taken for thin parts, also beside rims, and what is off such parts for the end
+    of the sheet."""
     sheet = single(box(n, seed)[0]).sheet
     assert (shapes.euler(sheet), sheet.border_loops()) == (1, 1)
 
