@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from core import Mesh, Settings, reconstruct
+from core import Mesh, Reconstruction, Settings, reconstruct
 from core.cleaning.noise import noisy_samples
 from core.cleaning.offsets import alternate
 from core.normals.pca import pca_normals
@@ -118,8 +118,7 @@ def measure_strays(case: Case, share: float) -> dict:
     own points lost with them; pieces of the surface, and the share of its faces in the largest."""
     points = strewn(case, share)
     result = reconstruct(points, Settings())
-    kept = np.zeros(len(points), bool)
-    kept[result.source_index] = True
+    kept = kept_points(result, len(points))
     own = np.arange(len(points)) < len(case.points)
     untreated = reconstruct(points, Settings(outliers=False)) if share else result
     return {
@@ -131,6 +130,13 @@ def measure_strays(case: Case, share: float) -> dict:
         "untreated_cd": cd_and_hd(untreated.surface, case.truth)["cd"],
         "pieces": topology(result.surface)["components"],
     }
+
+
+def kept_points(result: Reconstruction, count: int) -> np.ndarray:
+    """Which of the `count` points given are samples of a run, (count,) bool."""
+    kept = np.zeros(count, bool)
+    kept[result.source_index] = True
+    return kept
 
 
 def measure_faint(case: Case, part: str, share: float, level: float) -> dict:

@@ -14,7 +14,7 @@ from core.io.report import write_report
 
 from .catalogue import CASES
 from .geometry import closest_points, surface_points
-from .noise_measure import by_peer, cd_and_hd
+from .noise_measure import by_peer, cd_and_hd, kept_points
 from .noise_tables import cells, markdown
 from .peers import check_open3d, poisson
 from .pictures import View, caption, draw_points, draw_surface, save, sheet
@@ -99,8 +99,7 @@ def measure_images(name: str, count: int = POINTS) -> dict:
     truth = CASES[name].surface().mesh
     points, flying = depth_images(truth, count, np.random.default_rng(0))
     result = reconstruct(points)
-    kept = np.zeros(len(points), bool)
-    kept[result.source_index] = True
+    kept = kept_points(result, len(points))
     far = flying & (closest_points(points, truth)[0] >= FAR)
     peer = by_peer(_filtered_poisson, points, truth)
     return {

@@ -124,6 +124,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
     }
     progress(1.0)
     row = samples.given_order()
+    near = replace(near, sample=np.argsort(row).astype(np.int32)[near.sample])
     return Reconstruction(
         points=samples.given[row],
         source_index=samples.source_index[row],
@@ -160,8 +161,7 @@ def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
 
 def _field(surfaces, near, feet, grid, samples, band):
     """The field in the input's units."""
-    place = np.argsort(samples.given_order()).astype(np.int32)
-    near = replace(near, step=near.step * samples.scale, sample=place[near.sample])
+    near = replace(near, step=near.step * samples.scale)
     origin, cell = samples.to_input_units(grid.origin), grid.spacing * samples.scale
     sdf, scale = "signed" in surfaces.meshes, np.float32(samples.scale)
     if band is None:

@@ -170,7 +170,8 @@ def _begun(task, folder, progress):
     samples = prepare_samples(task.points).in_spatial_order()
     samples, report = clean(samples, task.settings, progress.part(0.0, share, "cleaning"))
     spacing = local_spacing(samples.points)
-    row, normals, confidence, ignored = samples.given_order(), None, None, ()
+    row = samples.given_order()
+    normals, confidence, ignored = None, None, ()
     if task.until == NORMALS:
         constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
         part = progress.part(share, 1.0, "normals")

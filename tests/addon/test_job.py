@@ -144,6 +144,7 @@ def test_nobody_waits_for_a_process_that_is_slow_to_die(extension, start, large,
     monkeypatch.setattr(module, "_running", job)
     monkeypatch.setattr(job._process, "kill", lambda: None)  # the system takes its time
     os.kill(job._process.pid, signal.SIGSTOP)
+    os.waitpid(job._process.pid, os.WUNTRACED)  # stopped, not only about to be
     begin = time.monotonic()
     module.stop()
     assert not module.clear()

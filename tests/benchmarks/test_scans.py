@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("matplotlib")
 pytest.importorskip("igl")
 
-from benchmarks import scans
+from benchmarks import noise_measure, scans
 from benchmarks.geometry import closest_points
 from benchmarks.metrics import surface_errors
 from benchmarks.scanners import EYE, IMAGES, depth_images, seen_from_one_spot
@@ -60,22 +60,15 @@ def test_a_scan_from_one_spot_sees_each_ray_once_and_its_noise_is_along_rays():
 
 
 @pytest.fixture
-def crossing(monkeypatch):
-    """A small square above a large one in place of the shapes, peers that crash, and a coarse grid."""
-    mesh = two_squares(0.6)
-    surface = SimpleNamespace(mesh=mesh)
+def squares(monkeypatch):
+    """The two squares as a shape, next to peers that crash; errors from few points."""
+    surface = SimpleNamespace(mesh=two_squares(0.6))
     monkeypatch.setattr(scans, "CASES", {"squares": SimpleNamespace(surface=lambda: surface)})
     monkeypatch.setattr(scans, "by_peer", lambda *_: {})
-    monkeypatch.setattr(scans, "cd_and_hd", partial(few_errors, count=2000))
-    return mesh
+    monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
 
 
-def few_errors(mesh, truth, count):
-    errors = surface_errors(mesh, truth, count=count)
-    return {"cd": errors["cd"], "hd": errors["hd"]}
-
-
-def test_flying_points_found_and_points_lost_are_counted(crossing):
+def test_flying_points_found_and_points_lost_are_counted(squares):
     row = measure_images("squares", 6000)
     assert row["found"] > 0.8
     assert row["lost"] < 0.01
