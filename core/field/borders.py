@@ -2,7 +2,8 @@
 
 The printed method has no borders: on a flat patch the diffused axes are constant and the zero set is the whole plane.
 Here a sample whose neighbours leave a wide gap around it, seen in its tangent plane, is at a rim. Across the gap the
-sheet ends a little past the two neighbours that bound it, unless the gap is narrower than the bridging length.
+sheet ends a little past the two neighbours that bound it, unless the gap is narrower than the bridging length and no
+wall stands beside it.
 
 Neighbours beyond a crease are unfolded about the line where the two tangent planes meet, so they fill gaps like any
 other, and that line is where the patch ends, unless the sheet goes on straight (two sheets that cross).
@@ -18,6 +19,7 @@ from scipy.spatial import KDTree
 
 from ..parallel import in_order
 from ..progress import Progress
+from .walls import walled
 
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
@@ -78,7 +80,7 @@ def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge
     """
 
     def find(part):
-        return _find_rims(part, points, normals, frames[part], spacing[part], neighbours[part], tree, bridge)
+        return _find_rims(part, points, normals, frames[part], spacing, neighbours, tree, bridge)
 
     chunks = Progress.of(progress).chunks(len(points), rows_at_a_time(bridge, len(points)))
     found = [rims for _, rims in in_order(find, chunks)]
@@ -86,6 +88,8 @@ def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge
 
 
 def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge):
+    cloud = points, normals, spacing, neighbours
+    spacing, neighbours = spacing[part], neighbours[part]
     n, k = neighbours.shape
     own, theirs = normals[part], normals[neighbours]
     step = points[neighbours] - points[part, None]
@@ -114,8 +118,10 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     gap = (width > GAP) & (count > 0)
     distance = np.full(n, np.inf)
     rows = np.flatnonzero(gap)
-    distance[rows], _ = across_gaps(part.start + rows, outward[rows], spacing[rows], points, normals, tree, bridge)
+    distance[rows], other = across_gaps(part.start + rows, outward[rows], spacing[rows], points, normals, tree, bridge)
     bridged = np.isfinite(distance)
+    rows, other = rows[bridged[rows]], other[bridged[rows]]
+    bridged[rows] = ~walled(part.start + rows, other, *cloud)
     reach = np.zeros(n)
     reach[bridged] = bridged_reach(distance[bridged], spacing[bridged])
     ends = np.einsum("nea,nai->nei", ends, frames)

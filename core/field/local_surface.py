@@ -96,6 +96,6 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     rims = with_sparser_parts_joined(rims, points, normals, spacing, neighbours, tree, bridge, part)
     rims = with_line_gaps_bridged(rims, points, normals, spacing, tree, bridge, progress.part(0.87, 0.88))
     part = progress.part(0.88, 0.9)
-    rims = with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, bridge, part)
+    rims = with_sampling_gaps_bridged(rims, points, normals, bend, spacing, neighbours, tree, bridge, part)
     rims = with_rim_lines(rims, points, normals, spacing, tree, progress.part(0.9, 1.0))
     return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)

@@ -21,6 +21,7 @@ from scipy.spatial import KDTree
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
+from .walls import walled
 
 _FEW = 4  # samples in a row that a wide gap in the sampling may have at its rim
 _MANY = 8  # samples in a row that only an opening has at its rim
@@ -78,12 +79,13 @@ def with_sparser_parts_joined(
 
 
 def with_sampling_gaps_bridged(
-    rims: Rims, points, normals, bend, spacing, tree: KDTree, bridge: float, progress=None
+    rims: Rims, points, normals, bend, spacing, neighbours, tree: KDTree, bridge: float, progress=None
 ) -> Rims:
     """The rims with gaps in the sampling bridged that are as wide as chance leaves them, but no more than half as wide
-    again as `bridge` local spacings.
+    again as `bridge` local spacings, and have no walls beside them.
 
     points, normals : (n,3) float64     bend : (n,3,3) of the patches     spacing : (n,) local spacing
+    neighbours      : (n,k) int
     """
     few = chain_lengths(rims, rims.gap) <= _FEW
     rim = rims.gap & ~rims.bridged
@@ -93,6 +95,7 @@ def with_sampling_gaps_bridged(
     across = np.isfinite(distance) & few[other]
     row, other, distance = row[across], other[across], distance[across]
     met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance
+    met &= ~walled(row, other, points, normals, spacing, neighbours)
     row, covered = row[met], bridged_reach(distance[met], spacing[row[met]])
     further = rims.gap[row] | (covered > DISC * spacing[row])
     row, covered = row[further], covered[further]

@@ -25,7 +25,7 @@ def rims_of(points, normals):
 def before_and_after(points, normals, bend_times=1.0):
     rims, normals, spacing, neighbours, tree = rims_of(points, normals)
     bend = bend_times * bending(points, normals, tangent_frames(normals), spacing, neighbours)
-    return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, tree, 3.0), spacing
+    return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, neighbours, tree, 3.0), spacing
 
 
 def with_and_without_openings_kept(points, normals):

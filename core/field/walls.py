@@ -1,0 +1,37 @@
+"""Walls beside gaps: what lies between two samples of a sheet is open where the sheet turns away between them.
+
+A drilled hole or the slot between two teeth leaves a gap in the face around it that may be as narrow as chance leaves
+gaps between samples. But there the surface goes on down the sides of the hole: beside the gap, samples face it.
+"""
+
+import numpy as np
+
+_STEEP = 0.6  # largest |n_i . n_j| of a wall's samples
+_FACING = 0.5  # least cosine between their normals and the way across
+_BEFORE, _ASIDE, _UP = 0.2, 1.5, 2.0  # local spacings from the sample that the wall may lie behind, beside or above it
+_CROSSES = 0.3  # local spacings, that the samples of a sheet which crosses that of the gap lie off it on both sides
+
+
+def walled(row, other, points, normals, spacing, neighbours) -> np.ndarray:
+    """Whether a wall stands between samples `row` and `other` (m,), next to either, (m,) bool.
+
+    points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
+    """
+    cloud = points, normals, spacing, neighbours
+    return _wall_next_to(row, other, *cloud) | _wall_next_to(other, row, *cloud)
+
+
+def _wall_next_to(row, other, points, normals, spacing, neighbours):
+    way = points[other] - points[row]
+    width, size = np.linalg.norm(way, axis=1)[:, None], spacing[row, None]
+    way /= width
+    step, theirs = points[neighbours[row]] - points[row, None], normals[neighbours[row]]
+    along, up = (np.einsum("mki,mi->mk", step, axis) for axis in (way, normals[row]))
+    aside = np.sqrt(np.maximum(np.einsum("mki,mki->mk", step, step) - along**2 - up**2, 0))
+    facing = np.einsum("mki,mi->mk", theirs, way)
+    wall = (np.abs(facing) > _FACING) & (np.abs(np.einsum("mki,mi->mk", theirs, normals[row])) < _STEEP)
+    crossing = np.einsum("mki,mki->mk", step, theirs) / np.where(wall, facing, 1)  # of its plane and the way
+    wall &= (crossing > -_BEFORE * size) & (np.maximum(crossing, along) < width)
+    wall &= (aside < _ASIDE * size) & (np.abs(up) < _UP * size)
+    above, below = ((wall & (side * up > _CROSSES * size)).any(axis=1) for side in (1, -1))
+    return wall.any(axis=1) & ~(above & below)
