@@ -2,7 +2,8 @@
 
 Around a sample next to a crease the mirror images of the neighbours' axes form clusters, one for each sheet, and the
 sweeps settle between them, on the normal of none. The sample lies on one of the planes, though: its axis is taken to
-the densest cluster (as tangent planes are taken to the largest cluster of votes by A. Boulch and R. Marlet, Computer
+the plane that most of its neighbours lie in, if any does to within rounding (see :mod:`.planes`), or else to the
+densest cluster (as tangent planes are taken to the largest cluster of votes by A. Boulch and R. Marlet, Computer
 Graphics Forum 31(5), 2012), provided that the neighbours behind it lie in the plane across it, and that those of the
 sample rise out of its present one. Then facets between the sheets are cut, and the sweeps go on with those that are
 left.
@@ -15,6 +16,7 @@ from scipy.spatial import KDTree
 
 from ..progress import Progress
 from .mirrors import Mirrors
+from .planes import onto_planes
 from .reflection import sweep_once
 
 _NEIGHBOURS = 20  # of a sample, that may lie on its sheet
@@ -27,6 +29,7 @@ _STEEP, _FLAT = 0.12, 0.05  # mean sines at which neighbours rise out of the pla
 _LEAST_TURN = 0.2  # radians
 _ROUNDS, _SWEEPS = 4, 6
 _ACROSS = 0.2  # sine between axis and image, from which neighbours beside a crease are on different sheets
+_RISEN = 0.4  # sine by which they rise out of the plane, from which they are, too: the inside of a wedge lies between
 _CHUNK = 1024  # samples
 
 
@@ -46,10 +49,11 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            normals, more = _onto_sheets(points, spacing, tree, here, normals, free, agreed, part)
-            if not more.any():
+            normals, flat = onto_planes(points, spacing, tree, normals, _agreed(here, normals, free)[1])
+            normals, bent = _onto_sheets(points, spacing, tree, here, normals, free, agreed, part)
+            if not (flat | bent).any():
                 break
-            moved |= more
+            moved |= flat | bent
             beside = mirrors.and_around(moved)
             parted = mirrors.without(_across(mirrors, normals) & (beside[mirrors.site] | beside[mirrors.other]))
             normals = _settled(parted, normals, mirrors.and_around(beside) & free)
@@ -86,8 +90,8 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, free, agreed, progress
 
 
 def _across(mirrors, normals):
-    """Which neighbours, (p,) bool, have axes unlike those that the samples expect."""
-    return 1 - mirrors.cosines(normals) ** 2 > _ACROSS**2
+    """Which neighbours, (p,) bool, have axes unlike those that the samples expect, or rise far out of their plane."""
+    return (1 - mirrors.cosines(normals) ** 2 > _ACROSS**2) | (np.abs(mirrors.rises(normals)) > _RISEN)
 
 
 def _settled(mirrors, normals, rows):

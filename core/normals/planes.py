@@ -1,0 +1,59 @@
+"""Planes that samples on creases or next to them lie in, told from places alone.
+
+On a crease the axes around a sample say little: those of two sheets are there, those of other samples on the crease,
+and those next to it that lean on these. Of the samples on the edges of a cube's lattice the sweeps took most to the
+plane that halves the solid along the edge. Where the sheets are flat, the places tell: many of the neighbours lie in
+one plane with the sample, to within rounding, which chance does not do.
+"""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+_NEIGHBOURS = 20  # of a sample, that may lie in a plane with it
+_WIDTH = 1.7  # of the Gaussian of their distance, local spacings
+_NEAREST = 8  # pairs of these and the sample make the planes that are tried
+_WEDGE = 0.3  # least sine of the angle between two
+_INSIDE = 0.007  # of the Gaussian of the sine by which neighbours rise out of a plane
+_SHARE, _GAIN = (
+    0.35,
+    0.1,
+)  # least share of the neighbours in a plane, and by which it must exceed that of the present one
+_FEWEST = 6.0  # neighbours that must lie in it
+_CHUNK = 1024  # samples
+
+
+def onto_planes(points, spacing, tree: KDTree, normals, suspect):
+    """The axes (n,3) after those of samples `suspect` (n,) bool are taken to the plane in which most of their
+    neighbours lie, where there are enough; and which these are, (n,) bool.
+
+    points : (n,3) float64     spacing : (n,) local spacing     tree : of the points     normals : (n,3) unit axes
+    """
+    normals, moved, rows = normals.copy(), np.zeros(len(points), bool), np.flatnonzero(suspect)
+    for first in range(0, len(rows), _CHUNK):
+        row = rows[first : first + _CHUNK]
+        axes, founded = _fullest(row, points, spacing, tree, normals)
+        normals[row[founded]], moved[row[founded]] = axes[founded], True
+    return normals, moved
+
+
+def _fullest(row, points, spacing, tree, normals):
+    """Axes (r,3) of the planes through samples `row` (r,) with most of their neighbours in them, and whether these are
+    enough, (r,) bool."""
+    distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
+    distance, other = distance[:, 1:], other[:, 1:]
+    direction = (points[other] - points[row, None]) / distance[..., None]
+    near = np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
+    near /= near.sum(axis=1)[:, None]
+
+    one, two = np.triu_indices(min(_NEAREST, distance.shape[1]), 1)
+    axes = np.cross(direction[:, one], direction[:, two])
+    sine = np.linalg.norm(axes, axis=2)
+    axes = np.concatenate([normals[row, None], axes / np.maximum(sine, _WEDGE)[..., None]], axis=1)
+    inside = np.exp(-0.5 * (axes @ direction.transpose(0, 2, 1) / _INSIDE) ** 2)
+    share = np.einsum("rtk,rk->rt", inside, near)
+    share[:, 1:][sine < _WEDGE] = 0
+
+    every, best = np.arange(len(row)), share.argmax(axis=1)
+    most = share[every, best]
+    founded = (most > share[:, 0] + _GAIN) & (most > _SHARE) & (inside[every, best].sum(axis=1) > _FEWEST)
+    return axes[every, best], founded
