@@ -1,6 +1,7 @@
 """What the columns of a table of points hold, by name."""
 
 import re
+from itertools import count
 
 import numpy as np
 
@@ -14,11 +15,11 @@ _OF_SCANNERS = {4: ("intensity",), 7: ("intensity", *COLOURS)}
 
 
 def named_columns(path, names: list[str]) -> dict[str, int]:
-    """Where columns of these names are, x, y and z first; three of other names are taken for those. Raises
-    :class:`InputError` for more columns without them."""
+    """Where columns of these names are, x, y and z first; three of other names are taken for those. Columns of one name
+    are numbered from the second on. Raises :class:`InputError` for more columns without them."""
     columns = {}
     for column, name in enumerate(names):
-        columns.setdefault(_plain(name), column)
+        columns[_not_among(columns, _plain(name) or f"column_{column + 1}")] = column
     if not XYZ.keys() <= columns.keys():
         if len(names) > 3:
             seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
@@ -43,7 +44,13 @@ def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.nda
     return attributes
 
 
+def _not_among(taken, name):
+    """The name, or the first of name_2, name_3, ... that is not among those taken."""
+    tried = (f"{name}_{number}" if number > 1 else name for number in count(1))
+    return next(each for each in tried if each not in taken)
+
+
 def _plain(name):
-    name = _NO_NAME.sub("_", name.strip('" ')).strip("_") or "_"
+    name = _NO_NAME.sub("_", name.strip('" ')).strip("_")
     known = {*XYZ, *_COLOUR, *COLOURS, "intensity", "nx", "ny", "nz"}
     return name.lower() if name.lower() in known else name

@@ -3,6 +3,7 @@
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from itertools import chain, islice
 from pathlib import Path
 from typing import TextIO
@@ -13,16 +14,21 @@ from ..errors import InputError
 from .columns import XYZ, named_columns, unnamed_columns, with_colours_in_bytes
 
 _COMMA = re.compile(r"\d,\d")
+_COMMENT = re.compile(r"(?:^|(?<=[\s\d.,;]))(?:#|//)(?![,;\t])")  # not the mark in a name, as in "Point#,X,Y,Z"
 _UNIT = re.compile(r"\([^)]*\)|\[[^]]*\]")  # as in "X (m)"
 
 
 def read_text(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(n,3) float64 from a table, see :func:`core.io.points.read_points` for what it may look like, and its further
-    columns by name, (n,) each, if all that start with a number have one in each row."""
+    columns by name, (n,) each, those that have a number in each row."""
     try:
-        return _read(path, further=True)
+        points, attributes, _ = _read(path)
     except InputError:
-        return _read(path, further=False)
+        points, attributes, further = _read(path, ())
+        for name in further:
+            with suppress(InputError):
+                attributes |= _read(path, (name,))[1]
+    return points, with_colours_in_bytes(attributes)
 
 
 def read_obj(path: Path) -> np.ndarray:
@@ -45,18 +51,16 @@ class _Lines:
     def __iter__(self) -> Iterator[str]:
         for number, text in enumerate(self._file, start=1):
             self.number, self.text = number, text
-            comment = ""
-            for mark in ("#", "//"):
-                if mark in text:
-                    text, _, comment = text.partition(mark)
+            text, *comment = _COMMENT.split(text, maxsplit=1)
             text = text.strip()
             if text:
                 yield text
             elif comment:
-                self.comment = comment
+                self.comment = comment[0]
 
 
-def _read(path, further):
+def _read(path, wanted=None):
+    """The points, further columns by name, those `wanted` or all, and the names of all that there are."""
     with _open(path) as file:
         lines, claimed, header = _Lines(file), [], None
         rows = iter(lines)
@@ -67,25 +71,25 @@ def _read(path, further):
             first = next(rows, "")
         elif not any(map(_is_number, _split(first))):
             header, first = first, next(rows, "")
-        columns = _columns(path, header, lines.comment, _split(first), further)
+        columns = _columns(path, header, lines.comment, _split(first))
+        further = list(columns)[3:]
+        columns = {name: c for name, c in columns.items() if name in XYZ or wanted is None or name in wanted}
         table = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), tuple(columns.values()))
     if claimed and sum(claimed) != len(table):
         where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
         raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(table)} follow; is it cut off?")
-    attributes = dict(zip(list(columns)[3:], table.T[3:], strict=True))
-    return table[:, :3], with_colours_in_bytes(attributes)
+    return table[:, :3], dict(zip(list(columns)[3:], table.T[3:], strict=True)), further
 
 
-def _columns(path, header, comment, values, further):
-    """The columns to read, by name: x, y and z, then, where asked for, those with a number among the `values` of the
-    first row. A comment before it that names as many as there are is a header, as other programs write it."""
+def _columns(path, header, comment, values):
+    """The columns of numbers, by name: x, y and z, then those with one among the `values` of the first row. A comment
+    before it that names as many as there are is a header, as other programs write it."""
     named = _split(_UNIT.sub("", comment if header is None else header))
     if header is not None or (len(named) == len(values) and XYZ.keys() <= {name.lower() for name in named}):
         columns = named_columns(path, named)
     else:
         columns = unnamed_columns(path, len(values))
-    numbers = [further and _is_number(value) for value in values]
-    return {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and numbers[c])}
+    return {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and _is_number(values[c]))}
 
 
 def _rows_of_blocks(rows, claimed):

@@ -131,6 +131,32 @@ def test_a_bad_line_is_named_by_its_number(folder, bad, line):
     assert len(message) < len(str(folder)) + 200
 
 
+@pytest.mark.parametrize("head", ["Point#,X,Y,Z", "Pt #,X,Y,Z", "#,X,Y,Z", "a://b,X,Y,Z"])
+def test_marks_of_comments_may_stand_in_names(folder, head):
+    points, attributes = read_scan(written(folder, "scan.csv", head + "\n1,10,20,30\n2,11,21,31 # seen\n"))
+    assert points.tolist() == [[10, 20, 30], [11, 21, 31]]
+    assert [values.tolist() for values in attributes.values()] == [[1, 2]]
+
+
+@pytest.mark.parametrize("hole", [1, 2, 3])
+@pytest.mark.parametrize("cell", ["", "none"])
+def test_a_cell_without_a_number_costs_no_other_column(folder, hole, cell):
+    rows = [f"{k},0,0,{k},2,3,{cell if k == hole else 5}" for k in (1, 2, 3)]
+    path = written(folder, "scan.csv", "\n".join(["x,y,z,red,green,blue,class", *rows]))
+    points, attributes = read_scan(path)
+    assert points[:, 0].tolist() == attributes["red"].tolist() == [1, 2, 3]
+    assert list(attributes) == ["red", "green", "blue"]
+    assert all(values.dtype == np.uint8 for values in attributes.values())
+
+
+def test_columns_of_one_name_or_of_none_in_ascii_are_told_apart(folder):
+    path = written(folder, "scan.csv", "x,y,z,i,i,Größe,Gr  e,强度,X\n" + ",".join("123456789"))
+    attributes = read_scan(path)[1]
+    assert {name: values.item() for name, values in attributes.items()} == {
+        "i": 4, "i_2": 5, "Gr_e": 6, "Gr_e_2": 7, "column_8": 8, "x_2": 9,
+    }  # fmt: skip
+
+
 def test_a_table_of_words_is_refused(folder):
     assert "line 2 is 'anna,red,oslo'" in refusal(folder, "scan.csv", "name,colour,town\nanna,red,oslo\n")
     assert "line 2 is" in refusal(folder, "scan.txt", "Dear reader,\nthis is a letter\n")
