@@ -5,21 +5,29 @@ half a metre.
 """
 
 import os
+import re
 
 import numpy as np
 from plyfile import PlyData, PlyElement
 
+from ..errors import InputError
 from ..surface.mesh import Mesh
 from .atomic import atomic_path
+
+_NAME = re.compile(r"[!-~]+")
+_TYPES = "i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"
 
 
 def write_mesh(path: str | os.PathLike, mesh: Mesh, attributes: dict[str, np.ndarray] | None = None) -> None:
     """Write `mesh` as `path`: vertices double x, y, z in input units; faces as lists of int32 indices, four of each
     quad, then three of each triangle that is no half of one.
 
-    attributes : further properties of the vertices by name, (v,) each, written in their own type
+    attributes : further properties of the vertices by name, (v,) each; written in their own type, or, if PLY has none
+                 that long, as int32 where they fit and else as double
+
+    Raises :class:`InputError` for attributes that are not (v,) numbers, or whose names PLY cannot hold or are taken.
     """
-    vertices = _records(_triple("xyz", mesh.vertices) | (attributes or {}))
+    vertices = _records(_triple("xyz", mesh.vertices), attributes)
     _write(path, PlyElement.describe(vertices, "vertex"), _faces([mesh.quads, mesh.triangles]))
 
 
@@ -28,10 +36,11 @@ def write_points(
 ) -> None:
     """Write `points` (n,3) with their `normals` (n,3) as `path`.
 
-    Properties: double x, y, z in input units; float nx, ny, nz (unit axes); and `attributes` as in :func:`write_mesh`.
+    Properties: double x, y, z in input units; float nx, ny, nz (unit axes); and `attributes`, with the errors they
+    raise, as in :func:`write_mesh`.
     """
     axes = _triple(("nx", "ny", "nz"), np.asarray(normals, np.float32))
-    records = _records(_triple("xyz", points) | axes | (attributes or {}))
+    records = _records(_triple("xyz", points) | axes, attributes)
     _write(path, PlyElement.describe(records, "vertex"))
 
 
@@ -52,13 +61,36 @@ def _triple(names, block):
     return dict(zip(names, block.T, strict=True))
 
 
-def _records(fields):
-    """Structured little-endian array out of columns (n,) by name."""
+def _records(fields, attributes):
+    """Structured little-endian array out of columns (n,) by name, and of attributes."""
+    count = len(next(iter(fields.values())))
+    fields = fields | {name: _column(name, values, count, fields) for name, values in (attributes or {}).items()}
     types = [(name, column.dtype.newbyteorder("<")) for name, column in fields.items()]
-    records = np.empty(len(next(iter(fields.values()))), types)
+    records = np.empty(count, types)
     for name, column in fields.items():
         records[name] = column
     return records
+
+
+def _column(name, values, count, taken):
+    values = np.asarray(values)
+    if name in taken or not _NAME.fullmatch(name):
+        raise InputError(
+            f"a PLY file cannot have an attribute named {name!r}; choose a name without blanks, in ASCII, other than "
+            f"{', '.join(taken)}"
+        )
+    if values.shape != (count,) or values.dtype.kind not in "biuf":
+        raise InputError(
+            f"attribute {name!r} has shape {values.shape} and type {values.dtype}; give one number for each of "
+            f"{count} rows"
+        )
+    if values.dtype.kind == "b":
+        return values.astype(np.uint8)
+    if values.dtype.str[1:] in _TYPES:
+        return values
+    limits = np.iinfo(np.int32)
+    whole = values.dtype.kind in "iu" and limits.min <= values.min(initial=0) and values.max(initial=0) <= limits.max
+    return values.astype(np.int32 if whole else np.float64)
 
 
 def _write(path, *elements):

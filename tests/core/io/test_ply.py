@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from plyfile import PlyData
 
-from core import Mesh, VADError
+from core import InputError, Mesh, VADError
 from core.io.ply import write_mesh, write_points
 from core.io.points import read_points, read_scan
 
@@ -17,6 +17,7 @@ FAR_TETRAHEDRON = Mesh(
     np.vstack([np.zeros(3), np.eye(3)]) + np.array([4_500_000.123456, 500_000.654321, 0.1]),
     np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32),
 )
+TRIANGLE = Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32))
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +88,43 @@ def test_attributes_of_vertices_keep_their_type_and_come_back(folder, order):
     for name, values in found.items():
         np.testing.assert_array_equal(values, given[name])
         assert values.dtype == given[name].dtype.newbyteorder("<")
+
+
+@pytest.mark.parametrize(
+    ("values", "written"),
+    [
+        (np.array([0, 1, -(2**31)]), np.int32),
+        (np.array([0, 1, 2**40]), np.float64),
+        (np.array([0, 1, 2], np.uint64), np.int32),
+        (np.array([0, 1, 2.5], np.float16), np.float64),
+        (np.array([True, False, True]), np.uint8),
+        ([1, 2, 3], np.int32),
+    ],
+)
+def test_attributes_of_types_that_ply_lacks_are_written_as_others(folder, values, written):
+    write_mesh(folder / "m.ply", TRIANGLE, {"id": values})
+    found = read_scan(folder / "m.ply")[1]["id"]
+    assert found.dtype == written
+    np.testing.assert_array_equal(found, np.asarray(values))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("x", np.zeros(3), "named 'x'.*other than x, y, z"),
+        ("my id", np.zeros(3), "without blanks"),
+        ("Größe", np.zeros(3), "in ASCII"),
+        ("", np.zeros(3), "named ''"),
+        ("id", np.zeros(2), r"shape \(2,\).*each of 3 rows"),
+        ("id", np.zeros((3, 2)), r"shape \(3, 2\)"),
+        ("id", np.array(["a", "b", "c"]), "type <U1"),
+        ("id", np.array([1, None, 3]), "type object"),
+    ],
+)
+def test_attributes_that_ply_cannot_hold_are_refused(folder, name, values, said):
+    with pytest.raises(InputError, match=said):
+        write_mesh(folder / "n.ply", TRIANGLE, {name: values})
+    assert not (folder / "n.ply").exists()
 
 
 def test_a_failed_write_leaves_nothing(tmp_path):
