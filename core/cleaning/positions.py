@@ -8,6 +8,7 @@ import numpy as np
 
 from ..points import finite_points
 from ..progress import Progress
+from ..settings import Settings
 from .noise import noisy_samples
 from .noise_level import LADDER, estimate_noise
 from .quadrics import fit_quadrics
@@ -26,9 +27,11 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     strength : "auto" moves the samples that are found noisy; a number in [0,1] moves all this share of the way (0 none)
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
-    nothing is to do. Raises :class:`InputError` for points that are not finite.
+    nothing is to do. Raises :class:`InputError` for points that are not finite, :class:`SettingsError` for another
+    strength.
     """
     progress, given, points = Progress.of(progress), points, finite_points(points)
+    strength = Settings(denoise=strength).denoise
     if len(points) <= LADDER[0]:
         return given, {}
     if strength == "auto":

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, SettingsError
 
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T  # of a cell, as steps from its lowest node
 PADDING = 0.125  # of the object's longest side, on every side
@@ -41,13 +41,15 @@ def node_strides(shape: tuple[int, int, int]) -> np.ndarray:
 def fit_grid(points: np.ndarray, resolution: int) -> Grid:
     """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
     longest side, as many as needed along the others. Raises :class:`InputError` for points (n,3) that are not finite or
-    all in one place."""
+    all in one place, :class:`SettingsError` for less than one cell."""
     points = np.asarray(points, np.float64)
     low, high = points.min(axis=0), points.max(axis=0)
     if not 0 < (high - low).max() < np.inf:
         raise InputError(
             f"the points reach from {low} to {high}; a grid needs finite ones that are not all in one place"
         )
+    if not resolution >= 1:
+        raise SettingsError(f"resolution is {resolution}; a grid needs at least 1 cell")
     padding = PADDING * (high - low).max()
     sides = high - low + 2 * padding
     spacing = float(sides.max() / resolution)

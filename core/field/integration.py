@@ -18,6 +18,7 @@ from scipy.ndimage import distance_transform_edt
 from ..linalg import dots
 from ..parallel import work_through
 from ..progress import Progress
+from ..settings import Settings
 from .feet import no_farther_than_feet, settled_feet
 from .grid import Grid
 from .local_surface import LocalSurface
@@ -36,7 +37,8 @@ def distance_field(
 ) -> tuple[np.ndarray, NearBand]:
     """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples, and the band
     in which it is known with its direction. Outside the band by `integration`: "transport" or "poisson", the latter
-    with directions by `diffusion`: "kernel" or "grid"."""
+    with directions by `diffusion`: "kernel" or "grid". Raises :class:`SettingsError` for other words."""
+    Settings(integration=integration, diffusion=diffusion)
     progress = Progress.of(progress)
     node = near_nodes(surface, grid, BAND, progress.part(0.0, 0.05))
     near = surface.project(grid.positions(node), progress.part(0.05, 0.6), FROM_NODES)

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from ..errors import InputError, SettingsError
-from ..points import real_numbers
+from ..points import finite_points, real_numbers
 from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples
@@ -32,10 +32,12 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     (`random_axes`), from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and
     .975 instead of .970, .989 and .9999.
 
-    Raises :class:`MissingDependency` where torch or a GPU is asked for and missing, :class:`SettingsError` where NumPy
-    is asked for on a GPU.
+    Raises :class:`InputError` for points that are not finite and for constraints as :func:`checked_constraints` does,
+    :class:`MissingDependency` where torch or a GPU is asked for and missing, :class:`SettingsError` where NumPy is
+    asked for on a GPU.
     """
-    progress = Progress.of(progress)
+    progress, points = Progress.of(progress), finite_points(points)
+    constraints, _ = checked_constraints(constraints, np.arange(len(points)), len(points))
     if settings.solver == "pca":
         normals, confidence = pca_normals(points)
         if constraints is not None:

@@ -6,10 +6,23 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import core
-from core import Settings, reconstruct
+from core import (
+    InputError,
+    Settings,
+    SettingsError,
+    denoise,
+    distance_field,
+    estimate_normals,
+    fit_grid,
+    fit_local_surface,
+    local_spacing,
+    reconstruct,
+)
 from core.io.points import read_points
+from tests import shapes
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -46,3 +59,28 @@ def test_all_public_names_are_there_and_no_others():
 def test_settings_and_errors_alone_need_no_scipy():
     code = "import sys, core; core.Settings, core.VADError; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+def test_stages_alone_refuse_what_a_run_refuses():
+    points = shapes.sphere(300)
+    spacing, grid = local_spacing(points), fit_grid(points, 16)
+    with pytest.raises(SettingsError, match="resolution is 0"):
+        fit_grid(points, 0)
+    with pytest.raises(SettingsError, match="denoise is 5"):
+        denoise(points, spacing, 5)
+    for row in (300, -1):
+        with pytest.raises(InputError, match=f"row {row} the first"):
+            estimate_normals(points, spacing, constraints=([row], [[0, 0, 1.0]]))
+    surface = fit_local_surface(points, points, np.ones(300), spacing, 3.0)
+    for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
+        with pytest.raises(SettingsError, match="is 'foo'; choose one of"):
+            distance_field(surface, grid, **words)
+
+
+@pytest.mark.parametrize("solver", ["reflection", "pca", "energy"])
+def test_axes_given_to_the_stage_of_normals_may_have_any_length(solver):
+    points = shapes.sphere(100).tolist()
+    settings = Settings(solver=solver, backend="numpy")
+    normals, _, _ = estimate_normals(points, local_spacing(points), settings, ([7], [[0, 3.0, 4.0]]))
+    np.testing.assert_allclose(normals[7], [0, 0.6, 0.8])
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1)
