@@ -51,7 +51,9 @@ class _Lines:
     def __iter__(self) -> Iterator[str]:
         for number, text in enumerate(self._file, start=1):
             self.number, self.text = number, text
-            text, *comment = _COMMENT.split(text, maxsplit=1)
+            comment = []
+            if "#" in text or "//" in text:
+                text, *comment = _COMMENT.split(text, maxsplit=1)
             text = text.strip()
             if text:
                 yield text

@@ -25,7 +25,7 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     """Unit axes, confidence and what the solver did, for distinct samples.
 
     points      : (n,3) float64     spacing : (n,) float64, local spacing, same units
-    constraints : (indices (k,), axes (k,3)) held fixed, or None
+    constraints : (indices (k,), axes (k,3) of any length) held fixed, or None
     Returns normals (n,3), confidence (n,) in [0,1] and a dict for the report.
 
     The energy starts from the same Voronoi-weighted plane fit as the sweeps. The paper starts it from random axes

@@ -14,10 +14,8 @@ _WIDTH = 1.7  # of the Gaussian of their distance, local spacings
 _NEAREST = 8  # pairs of these and the sample make the planes that are tried
 _WEDGE = 0.3  # least sine of the angle between two
 _INSIDE = 0.007  # of the Gaussian of the sine by which neighbours rise out of a plane
-_SHARE, _GAIN = (
-    0.35,
-    0.1,
-)  # least share of the neighbours in a plane, and by which it must exceed that of the present one
+_SHARE = 0.35  # least share of the neighbours, by weight, in a plane
+_GAIN = 0.1  # by which it must exceed the share in that of the present axis
 _FEWEST = 6.0  # neighbours that must lie in it
 _CHUNK = 1024  # samples
 
