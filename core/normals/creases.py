@@ -16,11 +16,9 @@ from scipy.spatial import KDTree
 
 from ..progress import Progress
 from .mirrors import Mirrors
-from .planes import onto_planes
+from .planes import neighbourhoods, onto_planes
 from .reflection import sweep_once
 
-_NEIGHBOURS = 20  # of a sample, that may lie on its sheet
-_WIDTH = 1.7  # of the Gaussian of their distance, local spacings
 _ALIKE = 0.06  # of the Gaussian of the sine between axes of one sheet
 _AGREED = 0.6  # share of its neighbours that speak for the axis of a sample on a smooth sheet
 _GAIN = 0.1  # by which that share must rise
@@ -105,12 +103,9 @@ def _settled(mirrors, normals, rows):
 def _densest(row, points, spacing, tree, normals, agreed):
     """The axes (r,3) that most of the images around samples `row` (r,) agree with; the present ones where they are no
     better founded."""
-    distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
-    distance, other = distance[:, 1:], other[:, 1:]
-    direction = (points[other] - points[row, None]) / distance[..., None]
+    other, direction, near = neighbourhoods(row, points, spacing, tree)
     images = normals[other]
     images -= 2 * _cosine(images, direction)[..., None] * direction
-    near = np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
     weight = near * np.maximum(agreed[other], np.finfo(float).tiny)
 
     tried = np.concatenate([normals[row, None], images], axis=1)

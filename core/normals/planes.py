@@ -9,7 +9,7 @@ one plane with the sample, to within rounding, which chance does not do.
 import numpy as np
 from scipy.spatial import KDTree
 
-_NEIGHBOURS = 20  # of a sample, that may lie in a plane with it
+_NEIGHBOURS = 20  # of a sample, that may lie on its sheet
 _WIDTH = 1.7  # of the Gaussian of their distance, local spacings
 _NEAREST = 8  # pairs of these and the sample make the planes that are tried
 _WEDGE = 0.3  # least sine of the angle between two
@@ -18,6 +18,15 @@ _SHARE = 0.35  # least share of the neighbours, by weight, in a plane
 _GAIN = 0.1  # by which it must exceed the share in that of the present axis
 _FEWEST = 6.0  # neighbours that must lie in it
 _CHUNK = 1024  # samples
+
+
+def neighbourhoods(row, points, spacing, tree: KDTree):
+    """The neighbours that may lie on the sheets of samples `row` (r,), nearest first: their numbers (r,k), the unit
+    directions to them (r,k,3), and how near they are, (r,k) in [0,1]."""
+    distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
+    distance, other = distance[:, 1:], other[:, 1:]
+    direction = (points[other] - points[row, None]) / distance[..., None]
+    return other, direction, np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
 
 
 def onto_planes(points, spacing, tree: KDTree, normals, suspect):
@@ -37,13 +46,10 @@ def onto_planes(points, spacing, tree: KDTree, normals, suspect):
 def _fullest(row, points, spacing, tree, normals):
     """Axes (r,3) of the planes through samples `row` (r,) with most of their neighbours in them, and whether these are
     enough, (r,) bool."""
-    distance, other = tree.query(points[row], k=min(_NEIGHBOURS + 1, len(points)))
-    distance, other = distance[:, 1:], other[:, 1:]
-    direction = (points[other] - points[row, None]) / distance[..., None]
-    near = np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
+    _, direction, near = neighbourhoods(row, points, spacing, tree)
     near /= near.sum(axis=1)[:, None]
 
-    one, two = np.triu_indices(min(_NEAREST, distance.shape[1]), 1)
+    one, two = np.triu_indices(min(_NEAREST, near.shape[1]), 1)
     axes = np.cross(direction[:, one], direction[:, two])
     sine = np.linalg.norm(axes, axis=2)
     axes = np.concatenate([normals[row, None], axes / np.maximum(sine, _WEDGE)[..., None]], axis=1)
