@@ -60,11 +60,11 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
     work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing)
     work += area * (_SIDES * sides + _COVER * (settings.surface in ("double", "both")))
     if settings.band is None:
-        near = 2.0 * float(np.sum(cells**2 * (_NEAR + cells)))
+        near = min(nodes, 2.0 * float(np.sum(cells**2 * (_NEAR + cells))))
         work += _NEAR_NODE * near + _NODE * nodes
     else:
         width, share = _BAND_NEAR
-        near = 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells))))
+        near = min(nodes, 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells)))))
         work += _BAND_NEAR_NODE * near + _BAND_NODE * 2.0 * area * settings.band
     probe, busy = _probe()
     cpu = work * probe / _PROBE

@@ -67,13 +67,13 @@ class Samples:
 
 
 def real_numbers(given, what: str, wanted: str) -> np.ndarray:
-    """An array-like as float64. Raises :class:`InputError`, with `what` it is and what is `wanted` instead, where it is
-    none, or complex."""
+    """An array-like as float64, NaN where it is masked. Raises :class:`InputError`, with `what` it is and what is
+    `wanted` instead, where it is none, or complex."""
     try:
-        given = np.asarray(given)
+        given = np.asanyarray(given)
         if np.iscomplexobj(given):
             raise TypeError("complex numbers")
-        return given.astype(np.float64)
+        return np.asarray(np.ma.filled(given.astype(np.float64), np.nan))
     except (TypeError, ValueError) as error:
         raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
 

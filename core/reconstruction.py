@@ -8,7 +8,7 @@ from .field.distance_field import BandedField, DistanceField
 from .surface.mesh import Mesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reconstruction:
     """Everything a run found, in the input's units.
 

@@ -185,7 +185,7 @@ def default_in_words(option: dataclasses.Field):
 def _checked(option, value):
     name, metadata = option.name, option.metadata
     if metadata["choices"]:
-        if value not in metadata["choices"]:
+        if not isinstance(value, str) or value not in metadata["choices"]:
             raise SettingsError(f"{name} is {value!r}; choose one of {', '.join(metadata['choices'])}")
         return value
     if option.type is bool:

@@ -30,7 +30,7 @@ class _OnGrid:
         if self.near is not None and not self.sdf:
             row, step = self.near.between(inside, self.spacing)
             found[row] = np.sqrt(np.einsum("mi,mi->m", step, step))
-        return found + self.spacing * np.linalg.norm(cells - inside, axis=1)
+        return found + self.spacing * np.hypot.reduce(cells - inside, axis=1)
 
     def gradient(self, x) -> np.ndarray:
         """Unit-free gradient of :meth:`sample` at `x`, (m,3) -> (m,3) float64, central differences of half a cell."""
@@ -39,7 +39,7 @@ class _OnGrid:
         return np.stack(slopes, axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DistanceField(_OnGrid):
     """Distances at the nodes of a regular grid, in input units.
 
@@ -67,7 +67,7 @@ class DistanceField(_OnGrid):
         return map_coordinates(self.values, cells.T, order=1, mode="nearest", output=np.float64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BandedField(_OnGrid):
     """Distances at the nodes near the surface alone, in input units; beyond them, those to the surface's foot points.
 

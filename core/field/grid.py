@@ -40,10 +40,12 @@ def node_strides(shape: tuple[int, int, int]) -> np.ndarray:
 
 def fit_grid(points: np.ndarray, resolution: int) -> Grid:
     """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
-    longest side, as many as needed along the others. Raises :class:`InputError` for points (n,3) that are not finite or
-    all in one place, :class:`SettingsError` for less than one cell."""
-    points = np.asarray(points, np.float64)
-    low, high = points.min(axis=0), points.max(axis=0)
+    longest side, as many as needed along the others. Raises :class:`InputError` for anything but points (n,3), n >= 1,
+    that are finite and not all in one place, :class:`SettingsError` for less than one cell."""
+    points = np.asarray(points)
+    if points.dtype.kind not in "fiu" or points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise InputError(f"points are {points.dtype} of shape {points.shape}; a grid needs an (n,3) array of numbers")
+    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
     if not 0 < (high - low).max() < np.inf:
         raise InputError(
             f"the points reach from {low} to {high}; a grid needs finite ones that are not all in one place"

@@ -41,9 +41,10 @@ def read_points(path: str | os.PathLike) -> np.ndarray:
     """Read the points of a scan, (n,3) float64 in the file's units, n >= 1.
 
     .ply                    : x, y, z of the vertices; ascii or binary, with or without faces
-    .xyz, .pts, .txt, .csv  : a point a line, split by blanks, commas or semicolons; comments after # or //. A first
-                              line may name the columns, x, y and z among them, or be the number of points that
-                              follow, after which there may be more such blocks
+    .xyz, .pts, .txt, .csv  : a point a line, split by blanks, commas or semicolons; decimals after a comma where
+                              something else parts the numbers; comments after # or //. A first line may name the
+                              columns, x, y and z among them, or be the number of points that follow, after which
+                              there may be more such blocks
     .npy, .npz              : an (n,3) array (of a .npz: the one called `points`, else the only one of that shape)
     .obj                    : the v lines
 

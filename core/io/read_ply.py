@@ -2,16 +2,18 @@
 
 import io
 import re
+from codecs import BOM_UTF8
 from pathlib import Path
 
 import numpy as np
 from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 
 from ..errors import InputError
+from .not_a_number import spelt_plainly
 
-_FIRST_LINE = re.compile(rb"ply(\r\n|\n|\r)")
-_COMMENT = re.compile(rb"^[ \t]*(comment|obj_info)\b.*\n", re.MULTILINE)
-_ELEMENT = re.compile(rb"^([ \t]*element[ \t]+\S+)[ \t]+(-?\d+)[ \t]*$", re.MULTILINE)
+_FIRST_LINE = re.compile(rb"(?:" + BOM_UTF8 + rb")?ply[ \t]*(\r\n|\n|\r)", re.IGNORECASE)
+_IGNORED = re.compile(rb"((comment|obj_info)\b.*)?", re.DOTALL)
+_ELEMENT = re.compile(rb"^(element[ \t]+\S+)[ \t]+(-?\d+)$", re.MULTILINE)
 
 
 def read_ply(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -30,7 +32,8 @@ def _read(content):
     last = names.index("vertex")
     vertex = layout.elements[last]
     scalars = {p.name for p in vertex.properties if not isinstance(p, PlyListProperty)}
-    if not set("xyz") <= scalars:
+    axes = [next((name for name in (axis, axis.upper()) if name in scalars), None) for axis in "xyz"]
+    if None in axes:
         raise ValueError(f"its vertices have the numbers {sorted(scalars)}; x, y and z are needed")
 
     rows = [_smallest_row(element, layout) for element in layout]
@@ -50,36 +53,35 @@ def _read(content):
         vertices, rest = _read_rows(through_vertex, counts, layout, content[start:])
     if last == len(names) - 1 and rest.strip():
         raise ValueError(f"its header claims {counts[last]} vertices, but more data follows them")
-    points = np.stack([vertices[axis].astype(np.float64) for axis in "xyz"], axis=1)
-    return points, {p.name: vertices[p.name] for p in vertex.properties if p.name in scalars - set("xyz")}
+    points = np.stack([vertices[axis].astype(np.float64) for axis in axes], axis=1)
+    return points, {p.name: vertices[p.name] for p in vertex.properties if p.name in scalars - set(axes)}
 
 
 def _header(content):
     """What the header declares (elements without rows), their row counts, and where the data start.
 
     plyfile reads the header with every count set to zero, so that nothing is allocated before the counts are checked,
-    and without comments, which may be in any encoding.
+    and without comments, which may be in any encoding, blank lines and blanks at the ends of lines.
     """
     first = _FIRST_LINE.match(content)
     if not first:
         raise ValueError(f"it starts with {content[:16]!r}, not with a line 'ply'")
     newline = first[1]
-    end_line = newline + b"end_header" + newline
-    end = content.find(end_line)
-    if end < 0:
+    last = re.search(newline + rb"[ \t]*end_header[ \t]*" + newline, content)
+    if not last:
         raise ValueError("its header has no line 'end_header'; is it cut off?")
-    start = end + len(end_line)
+    lines = [line.strip() for line in content[first.end() : last.end()].split(newline)]
+    header = b"".join(line + b"\n" for line in (b"ply", *lines) if not _IGNORED.fullmatch(line))
     counts = []
 
     def without_rows(match):
         counts.append(int(match[2]))
         return match[1] + b" 0"
 
-    header = _COMMENT.sub(b"", content[:start].replace(newline, b"\n"))
     layout = PlyData.read(io.BytesIO(_ELEMENT.sub(without_rows, header)))
     if len(counts) != len(layout) or min(counts, default=0) < 0:
         raise ValueError("an element of its header has no valid count")
-    return layout, counts, start
+    return layout, counts, last.end()
 
 
 def _smallest_row(element, layout):
@@ -95,9 +97,10 @@ def _smallest_row(element, layout):
 def _read_rows(elements, counts, layout, body):
     """The rows of the last of `elements` and the bytes or text after them, by plyfile, row by row."""
     elements = [PlyElement(e.name, e.properties, n) for e, n in zip(elements, counts, strict=False)]
-    header = PlyData(elements, layout.text, layout.byte_order).header + "\n"
+    header = PlyData(elements, layout.text, layout.byte_order).header
     if layout.text:
-        stream = io.StringIO(header + body.decode("ascii", errors="replace"), newline=None)
+        lines = spelt_plainly(body.decode("ascii", errors="replace")).splitlines()
+        stream = io.StringIO("\n".join([header, *filter(str.strip, lines), ""]))
     else:
-        stream = io.BytesIO(header.encode("ascii") + body)
+        stream = io.BytesIO(header.encode("ascii") + b"\n" + body)
     return PlyData.read(stream)[elements[-1].name].data, stream.read()

@@ -12,10 +12,11 @@ import numpy as np
 
 from ..errors import InputError
 from .columns import XYZ, named_columns, unnamed_columns, with_colours_in_bytes
+from .not_a_number import spelt_plainly
 
-_COMMA = re.compile(r"\d,\d")
 _COMMENT = re.compile(r"(?:^|(?<=[\s\d.,;]))(?:#|//)(?![,;\t])")  # not the mark in a name, as in "Point#,X,Y,Z"
 _UNIT = re.compile(r"\([^)]*\)|\[[^]]*\]")  # as in "X (m)"
+_SEPARATOR = re.compile(r"\W?sep=.\W?", re.IGNORECASE)  # a line for spreadsheets
 
 
 def read_text(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -51,7 +52,7 @@ class _Lines:
     def __iter__(self) -> Iterator[str]:
         for number, text in enumerate(self._file, start=1):
             self.number, self.text = number, text
-            comment = []
+            text, comment = spelt_plainly(text), []
             if "#" in text or "//" in text:
                 text, *comment = _COMMENT.split(text, maxsplit=1)
             text = text.strip()
@@ -67,6 +68,8 @@ def _read(path, wanted=None):
         lines, claimed, header = _Lines(file), [], None
         rows = iter(lines)
         first = next(rows, "")
+        if _SEPARATOR.fullmatch(first):
+            first = next(rows, "")
         if _is_count(first):
             claimed.append(int(first))
             rows = _rows_of_blocks(rows, claimed)
@@ -76,6 +79,8 @@ def _read(path, wanted=None):
         columns = _columns(path, header, lines.comment, _split(first))
         further = list(columns)[3:]
         columns = {name: c for name, c in columns.items() if name in XYZ or wanted is None or name in wanted}
+        if _has_decimal_commas(first):
+            first, rows = _with_points(first), map(_with_points, rows)
         table = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), tuple(columns.values()))
     if claimed and sum(claimed) != len(table):
         where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
@@ -119,15 +124,15 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
     first = next(rows := iter(rows), None)
     if first is None:
         return np.empty((0, len(columns)))
+    how = dict(delimiter=delimiter, usecols=columns, comments=None, ndmin=2, quotechar='"' if '"' in first else None)
     try:
-        return np.loadtxt(chain([first], rows), delimiter=delimiter, usecols=columns, comments=None, ndmin=2)
+        return np.loadtxt(chain([first], rows), **how)
     except ValueError as error:  # loadtxt takes one row at a time: the last one is the culprit
         seen = lines.text.strip()
-        remedy = "; write decimals with a point" if _COMMA.search(seen) and delimiter != "," else ""
         seen = seen if len(seen) <= 60 else seen[:60] + "..."
         raise InputError(
             f"{path}: line {lines.number} is {seen!r}; numbers x y z are expected in "
-            f"columns {', '.join(str(column + 1) for column in columns[:3])}{remedy}"
+            f"columns {', '.join(str(column + 1) for column in columns[:3])}"
         ) from error
 
 
@@ -139,8 +144,22 @@ def _delimiter(row):
     return "\t" if len(cells) >= 3 and all(cell.strip() for cell in cells) else None
 
 
+def _has_decimal_commas(row):
+    """Whether something else than commas parts its cells: semicolons, or blanks and tabs between whole numbers and
+    such with a comma inside."""
+    if ";" in row:
+        return True
+    cells = row.split()
+    return len(cells) >= 3 and all(cell.strip(",") == cell and _is_number(_with_points(cell)) for cell in cells)
+
+
+def _with_points(row):
+    return row.replace(",", ".")
+
+
 def _split(row):
-    return [token.strip() for token in row.split(_delimiter(row))]
+    row = _with_points(row) if _has_decimal_commas(row) else row
+    return [token.strip().strip('"') for token in row.split(_delimiter(row))]
 
 
 def _is_count(line):

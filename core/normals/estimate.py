@@ -88,7 +88,7 @@ def _backend(settings):
 
 def checked_constraints(constraints, source_index: np.ndarray, count: int):
     """Constraints given by rows of an input of `count` rows, as (rows of the samples used, unit axes), and warnings;
-    None stays None.
+    None, or none of them, gives None.
 
     Rows that were dropped (duplicates, strays, NaN) are ignored, which is what the warning says. Raises
     :class:`InputError` for shapes that do not match, rows outside the input, or axes without a direction.
@@ -101,6 +101,8 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
     except (TypeError, ValueError) as error:
         raise InputError(f"constraints are not (indices, axes): {error}") from error
     axes = real_numbers(axes, "constraint axes", "a (k,3) array")
+    if not indices.size and not axes.size:
+        return None, ()
     if indices.ndim != 1 or axes.shape != (len(indices), 3) or (len(indices) and indices.dtype.kind not in "iu"):
         raise InputError(
             f"constraints have shapes {indices.shape} and {axes.shape}; give whole-number indices (k,) and axes (k,3)"

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..errors import SettingsError
 from ..field.blocks import each
 from ..field.grid import Grid, padding_cells
 from ..field.local_surface import LocalSurface
@@ -37,9 +38,13 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
 
     Patches of samples far apart do not quite meet, and an iso-surface closer than the cracks between them has holes: on
     `spot_sparse500` of the benchmarks its Euler number is -48 at 1 cell and -18 at the 2.5 that this is; 4 is right.
+    Raises :class:`SettingsError` for an offset that the box has no room for.
     """
+    room = padding_cells(max(grid.shape) - 1)
+    if not 0 < offset <= room:
+        raise SettingsError(f"offset is {offset:g}; it must be above 0 and at most {room:g} cells, the room in the box")
     raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
-    return max(offset, _CLOSEST, min(raised, _WITHIN * padding_cells(max(grid.shape) - 1)))
+    return max(offset, _CLOSEST, min(raised, _WITHIN * room))
 
 
 def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offset: float, progress=None) -> Mesh:

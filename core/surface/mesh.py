@@ -12,7 +12,7 @@ from ..parallel import over_rows
 AT_ONCE = 1 << 15  # faces
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """A mesh of triangles and quads; a quad is there as two triangles.
 

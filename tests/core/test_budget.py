@@ -65,6 +65,11 @@ def test_processor_time_is_what_a_run_takes_within_a_factor_of_three(samples, se
     assert taken / 3 < estimated < 3 * taken
 
 
+def test_no_more_nodes_are_near_the_surface_than_there_are():
+    corners = np.indices((2, 2, 2)).reshape(3, 8).T
+    assert cost(corners, 128)[0].cpu_seconds < 3 * cost(np.concatenate([corners, POINTS / 4]), 128)[0].cpu_seconds
+
+
 def test_a_clock_that_ticks_slowly_does_for_the_probe(monkeypatch):
     tick, true = 1 / 64, time.thread_time
     monkeypatch.setattr("core.budget.time.thread_time", lambda: true() // tick * tick)

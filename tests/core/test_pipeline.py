@@ -213,6 +213,12 @@ class TestInvariance:
         of_its_own = np.linalg.norm(x - here.points[near.sample], axis=1)
         np.testing.assert_allclose(of_its_own, KDTree(here.points).query(x)[0], rtol=1e-6)
 
+    def test_compares_by_identity(self, here, points):
+        there = reconstruct(points, Settings(resolution=24, surface="none"))
+        for mine, other in ((here, there), (here.field, there.field), (here.surface, there.surface)):
+            assert mine == mine
+            assert mine != other
+
     def test_the_seed_moves_results_by_less_than_one_sees(self, points, here):
         there = reconstruct(points, Settings(resolution=24, seed=1))
         assert cosines(there.normals, here.normals).min() > 0.9999
@@ -282,7 +288,7 @@ def test_a_constraint_reaches_its_neighbours():
 def test_no_constraints_and_constraints_on_dropped_rows_change_nothing():
     points = np.concatenate([shapes.sphere(200), shapes.sphere(200)[:1]])
     plain = reconstruct(points, FIELD_ONLY)
-    for constraints in (([], np.empty((0, 3))), ([200], EYE[:1])):
+    for constraints in (([], np.empty((0, 3))), ([], []), ([200], EYE[:1])):
         assert reconstruct(points, FIELD_ONLY, constraints).normals.tobytes() == plain.normals.tobytes()
 
 

@@ -50,6 +50,13 @@ def test_drops_rows_that_are_not_finite_with_a_count():
     assert "NaN" in samples.warnings[0]
 
 
+def test_drops_rows_with_a_masked_number():
+    points = np.ma.masked_equal([*TETRAHEDRON, [0, 7, 2]], 7)
+    samples = prepare_samples(points)
+    np.testing.assert_array_equal(samples.given, TETRAHEDRON)
+    assert "1 of 5" in samples.warnings[0]
+
+
 def test_keeps_the_first_of_equal_points_in_the_order_given():
     points = np.array([*TETRAHEDRON[::-1], *TETRAHEDRON, [-0.0, 0.0, -0.0]], float)
     samples = prepare_samples(points)

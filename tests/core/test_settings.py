@@ -61,7 +61,7 @@ def test_a_whole_number_is_asked_for():
 
 
 @pytest.mark.parametrize("name", CHOICES)
-@pytest.mark.parametrize("value", ["nonsense", None, 0, ["double"]])
+@pytest.mark.parametrize("value", ["nonsense", None, 0, ["double"], np.zeros(2)])
 def test_an_unknown_choice_lists_the_known_ones(name, value):
     with pytest.raises(SettingsError) as caught:
         Settings(**{name: value})

@@ -15,6 +15,7 @@ from core import (
     SettingsError,
     denoise,
     distance_field,
+    double_cover,
     estimate_normals,
     fit_grid,
     fit_local_surface,
@@ -66,6 +67,9 @@ def test_stages_alone_refuse_what_a_run_refuses():
     spacing, grid = local_spacing(points), fit_grid(points, 16)
     with pytest.raises(SettingsError, match="resolution is 0"):
         fit_grid(points, 0)
+    for nothing in ([], "abc", np.empty((0, 3)), points[:, :2]):
+        with pytest.raises(InputError, match=r"a grid needs an \(n,3\) array"):
+            fit_grid(nothing, 16)
     with pytest.raises(SettingsError, match="denoise is 5"):
         denoise(points, spacing, 5)
     for row in (300, -1):
@@ -75,6 +79,10 @@ def test_stages_alone_refuse_what_a_run_refuses():
     for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
         with pytest.raises(SettingsError, match="is 'foo'; choose one of"):
             distance_field(surface, grid, **words)
+    values, near = distance_field(surface, grid)
+    for offset in (30, 0, float("nan")):
+        with pytest.raises(SettingsError, match=f"offset is {offset}; it must be above 0 and at most 1.6 cells"):
+            double_cover(values, near, surface, grid, offset)
 
 
 @pytest.mark.parametrize("solver", ["reflection", "pca", "energy"])

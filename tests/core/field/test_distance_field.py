@@ -56,6 +56,12 @@ def test_outside_the_box_the_way_to_it_is_added():
     np.testing.assert_allclose(field.sample(x[:1]), field.values[-1, -1, -1] + 5, atol=1e-6)
 
 
+def test_however_far_outside_there_is_a_distance():
+    for factor in (1e30, 1e200):
+        x = np.array([[3, -4, 0], [0, 0, 5]]) * factor
+        np.testing.assert_allclose(noise().sample(x), 5 * factor)
+
+
 def test_is_continuous_across_the_side_of_the_box():
     field = noise()
     x = ORIGIN + np.random.default_rng(1).uniform(0, 1, (50, 3)) * (HIGH - ORIGIN)

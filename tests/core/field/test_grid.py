@@ -33,6 +33,14 @@ def test_the_longest_side_has_as_many_cells_as_asked(resolution):
     assert max(fit_grid(box(1, 3, 2), resolution).shape) == resolution + 1
 
 
+def test_single_precision_and_whole_numbers_make_the_grid_of_doubles():
+    points = box(1, 2, 3)
+    for kind in (np.float32, np.int16):
+        grid, same = fit_grid(points, 20), fit_grid(points.astype(kind), 20)
+        assert same.spacing == grid.spacing
+        np.testing.assert_array_equal(same.origin, grid.origin)
+
+
 def test_a_cube_has_equal_sides():
     assert fit_grid(box(1, 1, 1), 40).shape == (41, 41, 41)
 

@@ -171,3 +171,27 @@ def test_damage_in_the_header_is_refused_or_harmless(folder, form):
         damaged[place] ^= rng.integers(1, 256)
         with suppress(InputError):
             assert read_points(written(folder, damaged)).shape[1] == 3
+
+
+@pytest.mark.parametrize("form", sorted(FORMATS))
+@pytest.mark.parametrize(
+    ("written_as", "instead"),
+    [
+        (b"ply\n", b"\xef\xbb\xbfply\n"),
+        (b"ply\n", b"PLY \n"),
+        (b"end_header\n", b"end_header \t\n"),
+        (b"\nelement", b" \n\n \t\n  element"),
+        (b"property double z", b"property double Z"),
+    ],
+)
+def test_headers_that_other_programs_read(folder, form, written_as, instead):
+    points = np.array([[1, 2, 3], [4, 5, 6.5]])
+    content = ply([vertices(points), faces(1)], **FORMATS[form])
+    assert content.count(written_as) == 1 or written_as == b"\nelement"
+    np.testing.assert_array_equal(read_points(written(folder, content.replace(written_as, instead))), points)
+
+
+def test_blank_lines_and_what_is_not_a_number_in_text(folder):
+    content = ply([vertices(np.array([[1, 2, 3], [4, 5, 6.5], [7, 8, 9]])), faces(1)], text=True)
+    content = content.replace(b"6.5", b"-nan(ind)\n \n").replace(b"7 8", b"1.#QNAN 8")
+    np.testing.assert_array_equal(read_points(written(folder, content)), [[1, 2, 3], [4, 5, np.nan], [np.nan, 8, 9]])
