@@ -6,7 +6,7 @@ the plane that most of its neighbours lie in, if any does to within rounding (se
 densest cluster (as tangent planes are taken to the largest cluster of votes by A. Boulch and R. Marlet, Computer
 Graphics Forum 31(5), 2012), provided that the neighbours behind it lie in the plane across it, and that those of the
 sample rise out of its present one. Then facets between the sheets are cut, and the sweeps go on with those that are
-left.
+left, and at last samples are taken to planes that they share with neighbours (see :mod:`.shared_planes`).
 
 The paper has no such step. Where there is no crease it changes nothing at all.
 """
@@ -18,6 +18,7 @@ from ..progress import Progress
 from .mirrors import Mirrors
 from .planes import neighbourhoods, onto_planes
 from .reflection import sweep_once
+from .shared_planes import onto_shared_planes
 
 _ALIKE = 0.06  # of the Gaussian of the sine between axes of one sheet
 _AGREED = 0.6  # share of its neighbours that speak for the axis of a sample on a smooth sheet
@@ -41,37 +42,39 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     """
     progress = Progress.of(progress)
     progress(0.0)
-    free, moved, parted = np.ones(len(points), bool), np.zeros(len(points), bool), mirrors
-    free[list(fixed)] = False
-    agreed, suspect = _agreed(mirrors, normals, free)
+    fixed = np.isin(np.arange(len(points)), fixed)
+    moved, held = np.zeros(len(points), bool), fixed
+    agreed, suspect = _agreed(mirrors, normals, held)
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            normals, flat = onto_planes(points, spacing, tree, normals, _agreed(here, normals, free)[1])
-            normals, bent = _onto_sheets(points, spacing, tree, here, normals, free, agreed, part)
+            normals, flat = onto_planes(points, spacing, tree, normals, _agreed(here, normals, fixed)[1])
+            normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)
             if not (flat | bent).any():
                 break
-            moved |= flat | bent
-            beside = mirrors.and_around(moved)
-            parted = mirrors.without(_across(mirrors, normals) & (beside[mirrors.site] | beside[mirrors.other]))
-            normals = _settled(parted, normals, mirrors.and_around(beside) & free)
+            moved = moved | flat | bent
+            beside = mirrors.and_around(mirrors.and_around(moved))
+            normals = _settled(_parted(mirrors, normals, moved), normals, beside & ~held)
+            normals, shared = onto_shared_planes(points, spacing, tree, mirrors, normals, ~fixed)
+            held, moved = held | shared, moved | shared
+    parted = _parted(mirrors, normals, moved) if moved.any() else mirrors
     return normals, parted.confidence(normals), moved
 
 
-def _agreed(mirrors, normals, free):
+def _agreed(mirrors, normals, held):
     """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
     agreed = mirrors.gather @ _alike(mirrors.cosines(normals))
     rise = mirrors.gather @ np.abs(mirrors.rises(normals))
-    return agreed, (agreed < _AGREED) & (rise > _STEEP) & free
+    return agreed, (agreed < _AGREED) & (rise > _STEEP) & ~held
 
 
-def _onto_sheets(points, spacing, tree, mirrors, normals, free, agreed, progress):
+def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress):
     """The axes after those of samples beside creases are taken to one sheet's normal, and which these are; all have
     their neighbours in `mirrors`. `agreed` (n,) holds for the others."""
     normals, moved, here = normals.copy(), np.zeros(len(points), bool), np.unique(mirrors.site)
     changed = ~moved
     for _ in range(_ROUNDS):
-        found, suspect = _agreed(mirrors, normals, free)
+        found, suspect = _agreed(mirrors, normals, held)
         agreed[here] = found[here]
         row = np.flatnonzero(suspect & mirrors.and_around(mirrors.and_around(changed)))
         axes = np.empty((len(row), 3))
@@ -85,6 +88,12 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, free, agreed, progress
         normals[changed] = axes[turned]
         moved |= changed
     return normals, moved
+
+
+def _parted(mirrors, normals, moved):
+    """The mirrors without those across creases beside samples `moved` (n,) bool."""
+    beside = mirrors.and_around(moved)
+    return mirrors.without(_across(mirrors, normals) & (beside[mirrors.site] | beside[mirrors.other]))
 
 
 def _across(mirrors, normals):

@@ -1,0 +1,76 @@
+"""Samples beside creases that lie in the planes of neighbours.
+
+Where a sheet is flat, each axis on it tells the plane that all of it lies in. A sample in one plane with two neighbours
+whose axes are alike, to within rounding, lies on their sheet, however few of its neighbours do: on the edges of solids
+and at their corners those of each sheet are few. Chance, and curved sheets, hardly ever put samples so.
+"""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..linalg import dots
+from .mirrors import Mirrors
+from .planes import neighbourhoods
+
+_INSIDE = 0.004  # sine by which a sample may rise out of the plane of a neighbour
+_ALIKE = np.cos(0.02)  # cosine between axes of one plane
+_UNLIKE = np.cos(0.1)  # cosine between axes that are worth a change
+_MORE = 2  # neighbours that must share a plane with a sample beyond those that share that of its present axis
+_WEDGE = 0.2  # least sine of the angle between two of them: all of a straight line share any plane along it
+_ROUNDS = 4  # for those that share the planes of others once these are right
+_CHUNK = 1024  # samples
+
+
+def onto_shared_planes(points, spacing, tree: KDTree, mirrors: Mirrors, normals, free):
+    """The axes (n,3) after those of samples are taken to the plane that most of their neighbours share with them, and
+    which these are, (n,) bool.
+
+    points : (n,3) float64     spacing : (n,) local spacing     tree : of the points     mirrors : of the points
+    free   : (n,) bool, samples whose axes may change
+    """
+    moved = np.zeros(len(points), bool)
+    for _ in range(_ROUNDS):
+        rows = np.flatnonzero(free & _offered(mirrors, normals))
+        turned, changed = normals.copy(), np.zeros(len(points), bool)
+        for first in range(0, len(rows), _CHUNK):
+            row, axes = _most_shared(rows[first : first + _CHUNK], points, spacing, tree, normals)
+            turned[row], changed[row] = axes, True
+        if not changed.any():
+            break
+        normals, moved = turned, moved | changed
+    return normals, moved
+
+
+def _offered(mirrors, normals):
+    """Which samples, (n,) bool, lie in the plane of a neighbour whose axis is unlike theirs."""
+    columns = np.ascontiguousarray(normals.T)
+    theirs = columns.take(mirrors.other, axis=1)
+    pair = np.flatnonzero(np.abs(dots(theirs, mirrors.direction)) < _INSIDE)
+    unlike = np.abs(dots(theirs[:, pair], columns[:, mirrors.site[pair]])) < _UNLIKE
+    found = np.zeros(len(normals), bool)
+    found[mirrors.site[pair[unlike]]] = True
+    return found
+
+
+def _most_shared(row, points, spacing, tree, normals):
+    """Those of the samples `row` (r,) that share another plane with enough of their neighbours, and its axis for each,
+    (m,) and (m,3)."""
+    other, direction, _ = neighbourhoods(row, points, spacing, tree)
+    theirs, own = normals[other], normals[row]
+    inside = np.abs(_cosine(theirs, direction)) < _INSIDE
+    alike = (np.abs(theirs @ theirs.transpose(0, 2, 1)) > _ALIKE) & inside[:, None] & inside[:, :, None]
+    every, best = np.arange(len(row)), alike.sum(axis=2).argmax(axis=1)
+    shared, first = alike[every, best], theirs[every, best]
+    axes = np.einsum("rk,rki->ri", shared * np.sign(_cosine(theirs, first[:, None])), theirs)
+    axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
+
+    present = (np.abs(_cosine(theirs, own[:, None])) > _ALIKE) & inside
+    more = shared.sum(axis=1) >= present.sum(axis=1) + _MORE
+    along = _cosine(direction, direction[every, best][:, None])
+    wide = np.where(shared, 1 - along**2, 0.0).max(axis=1) > _WEDGE**2
+    founded = more & wide & (np.abs(_cosine(axes, own)) < _UNLIKE)
+    return row[founded], axes[founded]
+
+
+def _cosine(a, b):
+    return np.einsum("...i,...i->...", a, b)
