@@ -22,6 +22,7 @@ from .single_layer import single_layer
 
 _TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
 _BETTER = 0.5  # times that distance, below which it is taken
+_SPARSE = 3.0  # cells, median local spacing from which no finer grid parts what the points do not
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,21 @@ def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     return needed
 
 
+def _said_of_torn(local, grid):
+    """Why there is a double cover in place of a single layer, and what helps: no finer grid where points lie many cells
+    apart."""
+    cells = np.median(local.spacing) / grid.spacing
+    if cells > _SPARSE:
+        return (
+            f"points {cells:.2g} cells apart are too few to tell sheets apart, where a single layer is torn: the "
+            "double cover is in its place; more points part them"
+        )
+    return (
+        "sheets run closer than the cells of the grid, where a single layer is torn: the double cover is in its place; "
+        "raise the resolution until they part"
+    )
+
+
 def extract_surfaces(
     values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
 ) -> Surfaces:
@@ -84,10 +100,7 @@ def extract_surfaces(
             cover = meshes.get("double") or double_cover(values, band, local, grid, settings.offset, part)
             if misfit(cover, local.points) < _BETTER * torn:
                 meshes["single"], unoriented = cover, 0
-                warnings.append(
-                    "sheets run closer than the cells of the grid, where a single layer is torn: the double cover is "
-                    "in its place; raise the resolution until they part"
-                )
+                warnings.append(_said_of_torn(local, grid))
         if unoriented:
             warnings.append(
                 f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "

@@ -260,3 +260,11 @@ def test_where_sheets_run_closer_than_cells_the_double_cover_is_kept(band):
     alone = reconstruct(points, Settings(resolution=48, surface="single", band=band, denoise=0))
     np.testing.assert_array_equal(alone.sheet.vertices, run.sheet.vertices)
     assert alone.surface is None
+
+
+def test_where_points_are_too_few_for_a_single_layer_no_finer_grid_is_advised():
+    corners = np.indices((2, 2, 2)).reshape(3, 8).T
+    (warning,) = reconstruct(corners, Settings(resolution=32, surface="single")).report["warnings"]
+    assert "the double cover is in its place" in warning
+    assert "more points part them" in warning
+    assert "resolution" not in warning
