@@ -92,8 +92,8 @@ def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def row_dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Inner products of the rows of arrays (m,k), (m,)."""
-    return np.einsum("mk,mk->m", a, b)
+    """Inner products along the last axis of arrays (...,k) that broadcast, (...)."""
+    return np.einsum("...k,...k->...", a, b)
 
 
 def lengths(a: np.ndarray) -> np.ndarray:

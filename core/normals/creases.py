@@ -14,6 +14,7 @@ The paper has no such step. Where there is no crease it changes nothing at all.
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import row_dots
 from ..progress import Progress
 from .mirrors import Mirrors
 from .planes import neighbourhoods, onto_planes
@@ -80,7 +81,7 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress
         axes = np.empty((len(row), 3))
         for some in progress.chunks(len(row), _CHUNK):
             axes[some] = _densest(row[some], points, spacing, tree, normals, agreed)
-        turned = np.abs(_cosine(axes, normals[row])) < np.cos(_LEAST_TURN)
+        turned = np.abs(row_dots(axes, normals[row])) < np.cos(_LEAST_TURN)
         if not turned.any():
             break
         changed = np.zeros(len(points), bool)
@@ -114,7 +115,7 @@ def _densest(row, points, spacing, tree, normals, agreed):
     better founded."""
     other, direction, near = neighbourhoods(row, points, spacing, tree)
     images = normals[other]
-    images -= 2 * _cosine(images, direction)[..., None] * direction
+    images -= 2 * row_dots(images, direction)[..., None] * direction
     weight = near * np.maximum(agreed[other], np.finfo(float).tiny)
 
     tried = np.concatenate([normals[row, None], images], axis=1)
@@ -127,14 +128,10 @@ def _densest(row, points, spacing, tree, normals, agreed):
     axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
 
     near *= alike
-    rise = np.einsum("rk,rk->r", near, np.abs(_cosine(axes[:, None], direction)))
+    rise = np.einsum("rk,rk->r", near, np.abs(row_dots(axes[:, None], direction)))
     rise /= np.maximum(near.sum(axis=1), np.finfo(float).tiny)
     founded = (share[every, best] > share[:, 0] + _GAIN) & (alike.sum(axis=1) > _FEWEST) & (rise < _FLAT)
     return np.where(founded[:, None], axes, normals[row])
-
-
-def _cosine(a, b):
-    return np.einsum("...i,...i->...", a, b)
 
 
 def _alike(cosine):

@@ -8,7 +8,7 @@ and at their corners those of each sheet are few. Chance, and curved sheets, har
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import dots
+from ..linalg import dots, row_dots
 from .mirrors import Mirrors
 from .planes import neighbourhoods
 
@@ -57,20 +57,16 @@ def _most_shared(row, points, spacing, tree, normals):
     (m,) and (m,3)."""
     other, direction, _ = neighbourhoods(row, points, spacing, tree)
     theirs, own = normals[other], normals[row]
-    inside = np.abs(_cosine(theirs, direction)) < _INSIDE
+    inside = np.abs(row_dots(theirs, direction)) < _INSIDE
     alike = (np.abs(theirs @ theirs.transpose(0, 2, 1)) > _ALIKE) & inside[:, None] & inside[:, :, None]
     every, best = np.arange(len(row)), alike.sum(axis=2).argmax(axis=1)
     shared, first = alike[every, best], theirs[every, best]
-    axes = np.einsum("rk,rki->ri", shared * np.sign(_cosine(theirs, first[:, None])), theirs)
+    axes = np.einsum("rk,rki->ri", shared * np.sign(row_dots(theirs, first[:, None])), theirs)
     axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
 
-    present = (np.abs(_cosine(theirs, own[:, None])) > _ALIKE) & inside
+    present = (np.abs(row_dots(theirs, own[:, None])) > _ALIKE) & inside
     more = shared.sum(axis=1) >= present.sum(axis=1) + _MORE
-    along = _cosine(direction, direction[every, best][:, None])
+    along = row_dots(direction, direction[every, best][:, None])
     wide = np.where(shared, 1 - along**2, 0.0).max(axis=1) > _WEDGE**2
-    founded = more & wide & (np.abs(_cosine(axes, own)) < _UNLIKE)
+    founded = more & wide & (np.abs(row_dots(axes, own)) < _UNLIKE)
     return row[founded], axes[founded]
-
-
-def _cosine(a, b):
-    return np.einsum("...i,...i->...", a, b)
