@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from .errors import MemoryBudgetError
 from .field.grid import Grid
+from .linalg import row_dots
 from .parallel import cores
 from .settings import BESIDE_OFFSET, WITH_SIDES, Settings
 
@@ -158,7 +159,7 @@ def _probe():
     times = [(time.perf_counter(), time.thread_time())]
     for _ in range(3):
         distance, index = KDTree(points).query(points, k=16)
-        np.exp(-np.einsum("nki,nki->nk", points[index], points[index]) * distance).sum()
+        np.exp(-row_dots(points[index], points[index]) * distance).sum()
         times.append((time.perf_counter(), time.thread_time()))
     by_clock, of_processor = np.diff(times, axis=0).T
     if not of_processor.min() > 0:

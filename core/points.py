@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .errors import InputError
+from .given_arrays import finite_points, points_array
 from .near_duplicates import find_near_duplicates
 from .progress import Progress
 from .spatial_order import spatial_order
@@ -64,37 +65,6 @@ class Samples:
 
     def _of_rows(self, rows):
         return replace(self, points=self.points[rows], given=self.given[rows], source_index=self.source_index[rows])
-
-
-def real_numbers(given, what: str, wanted: str) -> np.ndarray:
-    """An array-like as float64, NaN where it is masked. Raises :class:`InputError`, with `what` it is and what is
-    `wanted` instead, where it is none, or complex."""
-    try:
-        given = np.asanyarray(given)
-        if np.iscomplexobj(given):
-            raise TypeError("complex numbers")
-        return np.asarray(np.ma.filled(given.astype(np.float64), np.nan))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
-
-
-def points_array(given) -> np.ndarray:
-    """An array-like of points as (n,3) float64. Raises :class:`InputError` for another shape or other than numbers."""
-    points = real_numbers(given, "points", "an (n,3) array")
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"points have shape {points.shape}; give an (n,3) array of x, y, z")
-    return points
-
-
-def finite_points(given, least: int = 0) -> np.ndarray:
-    """The same of points that are all finite, at `least` so many; raises :class:`InputError` otherwise."""
-    points = points_array(given)
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
-        raise InputError(f"{(~finite).sum()} of {len(points)} points are not finite; leave them out")
-    if len(points) < least:
-        raise InputError(f"{len(points)} points given; at least {least} are needed")
-    return points
 
 
 def prepare_samples(points, progress=None) -> Samples:

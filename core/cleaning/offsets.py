@@ -19,7 +19,7 @@ L-BFGS instead of Adam, as it needs no rate.
 import numpy as np
 from scipy.optimize import minimize
 
-from ..linalg import inner
+from ..linalg import inner, row_dots
 from ..normals.energy import EnergyWeights, NormalEnergy
 from ..normals.estimate import estimate_normals
 from ..points import local_spacing
@@ -58,8 +58,8 @@ class OffsetEnergy:
         field = NormalEnergy(points, spacing, samples)
         self.weights, self.regularisation = weights, regularisation
         self.site, self.other, self.weight = field.site, field.other, field.weight
-        self.height_i = _dot(normals[self.site], field.from_site)
-        self.height_j = _dot(normals[self.other], field.from_other)
+        self.height_i = row_dots(normals[self.site], field.from_site)
+        self.height_j = row_dots(normals[self.other], field.from_other)
         unit = spacing[samples.facets.pairs].mean(axis=1)[samples.facet]
         self.lift_i, self.lift_j = spacing[self.site] / unit, spacing[self.other] / unit
 
@@ -92,13 +92,13 @@ class OffsetEnergy:
         step = place[self.near] - place[self.owner]
         length = np.linalg.norm(step, axis=1)
         direction, axis = step / length[:, None], self.normals[self.owner]
-        lean = _dot(axis, direction)
+        lean = row_dots(axis, direction)
         turn = (2 * lean / length)[:, None] * (axis - lean[:, None] * direction)
-        alignment = np.bincount(self.near, _dot(turn, self.normals[self.near]), n)
-        alignment -= np.bincount(self.owner, _dot(turn, axis), n)
+        alignment = np.bincount(self.near, row_dots(turn, self.normals[self.near]), n)
+        alignment -= np.bincount(self.owner, row_dots(turn, axis), n)
 
         drift = self.drift + moves[:, None] * self.normals
-        regular = 2 * _dot(drift, self.normals) + 2 * moves
+        regular = 2 * row_dots(drift, self.normals) + 2 * moves
         terms = np.array(
             [inner(self.weight, np.abs(gap)), inner(lean, lean), inner(drift, drift) + inner(moves, moves)]
         )
@@ -144,13 +144,9 @@ def best_moves(points, normals, given, seed: int = 0, progress=None) -> np.ndarr
 
 def largest_changes(before, after) -> float:
     """Mean length of the largest tenth of the differences between axes (n,3), whatever their signs."""
-    change = np.sqrt(np.maximum(2 - 2 * np.abs(_dot(before, after)), 0.0))
+    change = np.sqrt(np.maximum(2 - 2 * np.abs(row_dots(before, after)), 0.0))
     return float(np.sort(change)[-max(1, int(_LARGEST * len(change))) :].mean())
 
 
 def _axes(points, settings, progress):
     return estimate_normals(points, local_spacing(points), settings, progress=progress)[0]
-
-
-def _dot(a, b):
-    return np.einsum("ij,ij->i", a, b)

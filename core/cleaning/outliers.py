@@ -9,8 +9,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree
 
+from ..given_arrays import finite_points
+from ..linalg import row_dots
 from ..parallel import even_chunks, work_through
-from ..points import SPACING_NEIGHBOURS, finite_points
+from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
 from .quadrics import fit_quadrics
 
@@ -121,7 +123,7 @@ class _Surroundings:
             size = np.maximum(np.linalg.norm(extent, axis=1), np.finfo(float).tiny)
             self.thickness[part] = extent[:, 0] / size
             curve[part] = extent[:, 1] < _CURVE * size
-            off_plane[part] = np.abs(np.einsum("ni,ni->n", points[part] - centre, axes[:, :, 0]))
+            off_plane[part] = np.abs(row_dots(points[part] - centre, axes[:, :, 0]))
 
         work_through(look, even_chunks(n, _CHUNK, progress.part(0.0, 0.9)))
         for part in progress.part(0.9, 1.0).chunks(n, _CHUNK):
@@ -239,6 +241,6 @@ def _is_shell(points, spacing):
 
 def _cosines(a, b):
     """Of the angles between lines along the vectors (...,3) of either; 0 for vectors without a length."""
-    squares = np.einsum("...i,...i->...", a, a) * np.einsum("...i,...i->...", b, b)
-    product = np.abs(np.einsum("...i,...i->...", a, b))
+    squares = row_dots(a, a) * row_dots(b, b)
+    product = np.abs(row_dots(a, b))
     return product / np.sqrt(np.maximum(squares, np.finfo(float).tiny))

@@ -6,7 +6,7 @@ noise breaks first. Robust quadrics through the neighbours need no diagram, and 
 
 import numpy as np
 
-from ..points import finite_points
+from ..given_arrays import finite_points
 from ..progress import Progress
 from ..settings import Settings
 from .noise import noisy_samples

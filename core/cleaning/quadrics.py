@@ -100,7 +100,7 @@ def _fit(offset, distance):
 
     slope = coefficients[:, 1:3] / radius
     upright = normal - np.einsum("ma,mai->mi", slope, frame)
-    squared = np.einsum("mi,mi->m", upright, upright)
+    squared = row_dots(upright, upright)
     step = (coefficients[:, 0] / squared)[:, None] * upright
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
     return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95), radius[:, 0]
@@ -110,7 +110,7 @@ def _least_spread(offset, share):
     """Normals (m,3) of the weighted principal planes of points three (m,k) with weights (m,k) that sum to 1."""
     weighted = [share * part for part in offset]
     mean = [np.einsum("mk->m", part) for part in weighted]
-    spread = [np.einsum("mk,mk->m", weighted[a], offset[b]) - mean[a] * mean[b] for a, b in COMPONENTS]
+    spread = [row_dots(weighted[a], offset[b]) - mean[a] * mean[b] for a, b in COMPONENTS]
     return principal_axes(-np.stack(spread, axis=1))
 
 

@@ -17,6 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .walls import walled
@@ -137,14 +138,12 @@ def one_sheet(step, normals, other_normals) -> np.ndarray:
 
 def _level(step, normals, other_normals, step_up=_STEP):
     """Whether both ends of steps (...,3) are off each other's tangent plane by less than this share of their length."""
-    height = np.maximum(
-        np.abs(np.einsum("...i,...i->...", step, normals)), np.abs(np.einsum("...i,...i->...", step, other_normals))
-    )
+    height = np.maximum(np.abs(row_dots(step, normals)), np.abs(row_dots(step, other_normals)))
     return height < step_up * np.linalg.norm(step, axis=-1)
 
 
 def _aligned(normals, other_normals, least):
-    return np.abs(np.einsum("...i,...i->...", normals, other_normals)) > least
+    return np.abs(row_dots(normals, other_normals)) > least
 
 
 def _laid_flat(step, own, theirs, spacing, flat):
@@ -175,14 +174,14 @@ def _unfolded(step, normals, other_normals, spacing, candidate):
     folded = candidate & (np.abs(cosine) < _FOLD)
     sine = np.where(folded, sine, 1.0)
     across = across / sine[..., None]
-    line = np.einsum("nki,nki->nk", step, other_normals) / sine
+    line = row_dots(step, other_normals) / sine
     other_line = np.abs(np.einsum("nki,ni->nk", step, normals)) / sine
     across = across * np.where(line < 0, -1.0, 1.0)[..., None]
     line = np.abs(line)
     reach = _FOLD_REACH * spacing[:, None]
     folded &= (line < reach) & (other_line < reach)
     along = np.cross(normals[:, None], across)
-    slide = np.einsum("nki,nki->nk", step, along)
+    slide = row_dots(step, along)
     return folded, (line + other_line)[..., None] * across + slide[..., None] * along, across, line
 
 

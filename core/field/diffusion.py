@@ -8,7 +8,7 @@ underflows far from the surface.
 
 import numpy as np
 
-from ..linalg import COMPONENTS, principal_axes
+from ..linalg import COMPONENTS, principal_axes, row_dots
 
 DIFFUSION_LENGTH = 0.5  # sqrt(t) in local spacings, about the paper's t = h^2
 
@@ -37,7 +37,7 @@ def fused_axes(weight, pull, normals) -> np.ndarray:
     normal. Neither field depends on the sign of a normal.
     """
     weighted = weight * normals
-    tensor = [np.einsum("mk,mk->m", weighted[a], normals[b]) for a, b in COMPONENTS]
+    tensor = [row_dots(weighted[a], normals[b]) for a, b in COMPONENTS]
     axes = principal_axes(np.stack(tensor, axis=1).astype(np.float64))
     direction = np.einsum("imk,mk->mi", weighted, pull)
-    return axes * np.where(np.einsum("mi,mi->m", axes, direction) < 0, -1.0, 1.0)[:, None]
+    return axes * np.where(row_dots(axes, direction) < 0, -1.0, 1.0)[:, None]

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ..errors import VADError
-from ..points import finite_points
+from ..given_arrays import finite_points
+from ..linalg import row_dots
 from .blocks import Blocks
 from .feet import Feet
 from .grid import CORNERS
@@ -29,7 +30,7 @@ class _OnGrid:
         found = self._inside(inside)
         if self.near is not None and not self.sdf:
             row, step = self.near.between(inside, self.spacing)
-            found[row] = np.sqrt(np.einsum("mi,mi->m", step, step))
+            found[row] = np.sqrt(row_dots(step, step))
         return found + self.spacing * np.hypot.reduce(cells - inside, axis=1)
 
     def gradient(self, x) -> np.ndarray:
@@ -123,7 +124,7 @@ class BandedField(_OnGrid):
         weight = np.prod(np.where(CORNERS, share[:, None], 1 - share[:, None]), axis=2)
         corner = low[:, None] + CORNERS
         values = self.blocks.at(np.ravel_multi_index(tuple(np.moveaxis(corner, 2, 0)), self.shape)).astype(np.float64)
-        found = np.einsum("mc,mc->m", weight, values)
+        found = row_dots(weight, values)
         out = np.flatnonzero((np.abs(values) >= _WITHIN * self.band).any(axis=1))
         if len(out):
             inside = found[out] < 0

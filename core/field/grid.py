@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError, SettingsError
+from ..given_arrays import finite_points
 
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T  # of a cell, as steps from its lowest node
 PADDING = 0.125  # of the object's longest side, on every side
@@ -42,14 +43,10 @@ def fit_grid(points: np.ndarray, resolution: int) -> Grid:
     """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
     longest side, as many as needed along the others. Raises :class:`InputError` for anything but points (n,3), n >= 1,
     that are finite and not all in one place, :class:`SettingsError` for less than one cell."""
-    points = np.asarray(points)
-    if points.dtype.kind not in "fiu" or points.ndim != 2 or points.shape[1] != 3 or not len(points):
-        raise InputError(f"points are {points.dtype} of shape {points.shape}; a grid needs an (n,3) array of numbers")
-    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
+    points = finite_points(points, least=1)
+    low, high = points.min(axis=0), points.max(axis=0)
     if not 0 < (high - low).max() < np.inf:
-        raise InputError(
-            f"the points reach from {low} to {high}; a grid needs finite ones that are not all in one place"
-        )
+        raise InputError(f"the points reach from {low} to {high}; a grid needs points that are not all in one place")
     if not resolution >= 1:
         raise SettingsError(f"resolution is {resolution}; a grid needs at least 1 cell")
     padding = PADDING * (high - low).max()

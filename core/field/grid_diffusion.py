@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 
 from ..errors import SettingsError
-from ..linalg import outer, principal_axes
+from ..linalg import outer, principal_axes, row_dots
 from ..progress import Progress
 from .diffusion import DIFFUSION_LENGTH
 from .grid import CORNERS, Grid
@@ -69,7 +69,7 @@ def grid_axes(points, normals, spacing, grid: Grid, stride: int = 1, progress=No
 def _fused(components):
     """The principal axis of the tensors (m,6) that stand first, signed by the vectors (m,3) that follow."""
     axes = principal_axes(components[:, :6])
-    return axes * np.where(np.einsum("mi,mi->m", axes, components[:, 6:]) < 0, -1.0, 1.0)[:, None]
+    return axes * np.where(row_dots(axes, components[:, 6:]) < 0, -1.0, 1.0)[:, None]
 
 
 def _diffusion_length(spacing):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..linalg import dots
+from ..linalg import dots, row_dots
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .diffusion import fused_axes, kernel_weights
@@ -203,7 +203,7 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     axis = fused_axes(weight, near.pull, near.normals)
     cosine = dots(near.normals, axis.T.astype(np.float32)[:, :, None])
     towards = weight * cosine
-    tau = np.einsum("mk,mk->m", towards, near.above) / np.einsum("mk,mk->m", towards, cosine)
+    tau = row_dots(towards, near.above) / row_dots(towards, cosine)
 
     missed = np.abs(near.above - tau[:, None].astype(np.float32) * cosine)
     spread = np.sqrt(np.einsum("mk,mk,mk->m", weight, missed, missed))

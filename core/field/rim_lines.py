@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import RIM, Rims, chain_lengths, one_sheet
@@ -160,11 +161,11 @@ def _nearest_line(lines, rims, other, points, normals, spacing):
     for far_k, of in zip(far.T, near.T, strict=True):
         row = lines.row[of]
         step, size = points[other] - points[row], spacing[row]
-        along, up = (np.einsum("mi,mi->m", step, axis) / size for axis in (lines.tangent[of], rims.outward[row]))
+        along, up = (row_dots(step, axis) / size for axis in (lines.tangent[of], rims.outward[row]))
         towards = rims.outward[row] - lines.steepness(along, of)[:, None] * lines.tangent[of]
         length = np.linalg.norm(towards, axis=1)
         distance = size * (np.maximum((lines.at(along[:, None], of)[:, 0] - up) / length, 0) + _BEYOND)
         closer = one_sheet(step, normals[row], normals[other]) & (far_k < _REACH * size) & (distance < found)
         found[closer], way[closer] = distance[closer], towards[closer]
-    way -= np.einsum("mi,mi->m", way, normals[other])[:, None] * normals[other]
+    way -= row_dots(way, normals[other])[:, None] * normals[other]
     return way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny), found

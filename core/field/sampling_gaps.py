@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
@@ -145,16 +146,16 @@ def _left_by_chance(n):
 def _apart_halfway(row, other, points, normals, bend):
     """How far apart the patches of two samples each lie halfway between them, along their mean normal, (m,)."""
     own, theirs = normals[row], normals[other]
-    same = np.where(np.einsum("mi,mi->m", own, theirs) < 0, -1.0, 1.0)
+    same = np.where(row_dots(own, theirs) < 0, -1.0, 1.0)
     middle = 0.5 * (points[row] + points[other])
     apart = _foot(middle, points[row], own, bend[row]) - _foot(middle, points[other], theirs, bend[other])
     mean = own + same[:, None] * theirs
-    return np.abs(np.einsum("mi,mi->m", apart, mean)) / np.linalg.norm(mean, axis=1)
+    return np.abs(row_dots(apart, mean)) / np.linalg.norm(mean, axis=1)
 
 
 def _foot(x, points, normals, bend):
     """Where the patches of points (m,3) lie below or above x (m,3)."""
     offset = x - points
-    lateral = offset - np.einsum("mi,mi->m", offset, normals)[:, None] * normals
+    lateral = offset - row_dots(offset, normals)[:, None] * normals
     height = 0.5 * np.einsum("mi,mij,mj->m", lateral, bend, lateral)
     return points + lateral + height[:, None] * normals

@@ -6,6 +6,8 @@ gaps between samples. But there the surface goes on down the sides of the hole: 
 
 import numpy as np
 
+from ..linalg import row_dots
+
 _STEEP = 0.6  # largest |n_i . n_j| of a wall's samples
 _FACING = 0.5  # least cosine between their normals and the way across
 _BEFORE, _ASIDE, _UP = 0.2, 1.5, 2.0  # local spacings from the sample that the wall may lie behind, beside or above it
@@ -27,10 +29,10 @@ def _wall_next_to(row, other, points, normals, spacing, neighbours):
     way /= width
     step, theirs = points[neighbours[row]] - points[row, None], normals[neighbours[row]]
     along, up = (np.einsum("mki,mi->mk", step, axis) for axis in (way, normals[row]))
-    aside = np.sqrt(np.maximum(np.einsum("mki,mki->mk", step, step) - along**2 - up**2, 0))
+    aside = np.sqrt(np.maximum(row_dots(step, step) - along**2 - up**2, 0))
     facing = np.einsum("mki,mi->mk", theirs, way)
     wall = (np.abs(facing) > _FACING) & (np.abs(np.einsum("mki,mi->mk", theirs, normals[row])) < _STEEP)
-    crossing = np.einsum("mki,mki->mk", step, theirs) / np.where(wall, facing, 1)  # of its plane and the way
+    crossing = row_dots(step, theirs) / np.where(wall, facing, 1)  # of its plane and the way
     wall &= (crossing > -_BEFORE * size) & (np.maximum(crossing, along) < width)
     wall &= (aside < _ASIDE * size) & (np.abs(up) < _UP * size)
     above, below = ((wall & (side * up > _CROSSES * size)).any(axis=1) for side in (1, -1))

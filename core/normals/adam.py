@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..linalg import row_dots
 from ..progress import Progress
 
 MAX_STEPS = 1000
@@ -55,9 +56,9 @@ def minimise(
         if rate < _LAST_RATE or value == 0:
             break
 
-        gradient = gradient - np.einsum("ij,ij->i", gradient, axes)[:, None] * axes
+        gradient = gradient - row_dots(gradient, axes)[:, None] * axes
         mean = _DECAYS[0] * mean + (1 - _DECAYS[0]) * gradient
-        square = _DECAYS[1] * square + (1 - _DECAYS[1]) * np.einsum("ij,ij->i", gradient, gradient)[:, None]
+        square = _DECAYS[1] * square + (1 - _DECAYS[1]) * row_dots(gradient, gradient)[:, None]
         scale = np.sqrt(square / (1 - _DECAYS[1] ** step)) + np.finfo(np.float64).tiny
         axes = axes - rate / (1 - _DECAYS[0] ** step) * mean / scale
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)

@@ -128,7 +128,7 @@ def _densest(row, points, spacing, tree, normals, agreed):
     axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
 
     near *= alike
-    rise = np.einsum("rk,rk->r", near, np.abs(row_dots(axes[:, None], direction)))
+    rise = row_dots(near, np.abs(row_dots(axes[:, None], direction)))
     rise /= np.maximum(near.sum(axis=1), np.finfo(float).tiny)
     founded = (share[every, best] > share[:, 0] + _GAIN) & (alike.sum(axis=1) > _FEWEST) & (rise < _FLAT)
     return np.where(founded[:, None], axes, normals[row])

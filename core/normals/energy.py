@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ..linalg import inner
+from ..linalg import inner, row_dots
 from ..voronoi.bisectors import BisectorSamples
 from ..voronoi.clusters import near_cluster
 
@@ -96,7 +96,7 @@ class NormalEnergy:
 
     def _evaluate(self, normals):
         n_i, n_j, w = normals[self.site], normals[self.other], self.weight
-        height_i, height_j = _dot(n_i, self.from_site), _dot(n_j, self.from_other)
+        height_i, height_j = row_dots(n_i, self.from_site), row_dots(n_j, self.from_other)
         side_i, side_j = np.sign(height_i), np.sign(height_j)
 
         gap = np.abs(height_i) - np.abs(height_j)
@@ -109,7 +109,7 @@ class NormalEnergy:
         pull = (w / np.where(size > 0, size, 1.0))[:, None] * turn
         gradient = self._to_site @ (side_i[:, None] * pull) - self._to_other @ (side_j[:, None] * pull)
 
-        deviation = _dot(normals[self.owner], self.direction) - (1.0 if self.printed_alignment else 0.0)
+        deviation = row_dots(normals[self.owner], self.direction) - (1.0 if self.printed_alignment else 0.0)
         alignment = self._to_owner @ (2 * deviation[:, None] * self.direction)
         terms = np.array([inner(w, np.abs(gap)), inner(w, size), inner(deviation, deviation)])
         return terms, np.stack([distance, gradient, alignment])
@@ -119,10 +119,6 @@ def random_axes(count: int, seed: int) -> np.ndarray:
     """(count,3) uniform unit axes, the paper's start."""
     axes = np.random.default_rng(seed).normal(size=(count, 3))
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
-
-
-def _dot(a, b):
-    return np.einsum("ij,ij->i", a, b)
 
 
 def _scatter(index, n):

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from ..errors import InputError, SettingsError
-from ..points import finite_points, real_numbers
+from ..given_arrays import finite_points, real_numbers
 from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import InputError
-from ..points import real_numbers
+from ..given_arrays import real_numbers
 
 
 def known_normals(known, count: int, source_index) -> tuple[np.ndarray, np.ndarray]:

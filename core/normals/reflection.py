@@ -27,7 +27,7 @@ has no kinks, which is why a random start serves the sweeps as well as any and l
 
 import numpy as np
 
-from ..linalg import outer, principal_axes
+from ..linalg import outer, principal_axes, row_dots
 from ..progress import Progress
 from .mirrors import Mirrors
 
@@ -54,7 +54,7 @@ def reflection_sweeps(mirrors: Mirrors, constraints=None, start=None, progress=N
         progress(sweep / most)
         turned = sweep_once(mirrors, normals, sweep)
         turned[fixed] = axes
-        cosine = np.abs(np.einsum("ni,ni->n", turned, normals))
+        cosine = np.abs(row_dots(turned, normals))
         normals = turned
         if np.arccos(np.minimum(cosine, 1.0)).mean() < TOLERANCE:
             break

@@ -5,6 +5,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
+from ..linalg import row_dots
 from ..lookup import numbered
 from ..progress import Progress
 from .mesh import edges_of
@@ -38,12 +39,12 @@ def into_corners(
     for instance.
     """
     (low, high), _ = edges_of(faces, len(vertices))
-    turn = np.einsum("ei,ei->e", side[low], side[high])
+    turn = row_dots(side[low], side[high])
     bent = (turn > _FACING) & (turn < _TURN)
     low, high = low[bent], high[bent]
     way = vertices[high] - vertices[low]
-    concave = np.einsum("ei,ei->e", way, side[low]) > _ABOVE * cell
-    concave &= np.einsum("ei,ei->e", way, side[high]) < -_ABOVE * cell
+    concave = row_dots(way, side[low]) > _ABOVE * cell
+    concave &= row_dots(way, side[high]) < -_ABOVE * cell
     row, ends = np.unique(np.stack([low[concave], high[concave]]), return_inverse=True)
     low, high = ends.reshape(2, -1)
     step, off = _to_meetings(
@@ -90,7 +91,7 @@ def _laid_again(place, side, step, corner, other, surface, cell, progress):
         x = at + share * (place + further - at) + _LIFT * cell * normal
         near = surface.project(x, progress.part(turn / _ADVANCES, (turn + 1) / _ADVANCES))
         fresh = near.direction
-        same = ((np.einsum("vi,vi->v", fresh, normal) > _SAME) & ~near.past_rim)[:, None]
+        same = ((row_dots(fresh, normal) > _SAME) & ~near.past_rim)[:, None]
         at, normal, share = np.where(same, x - near.step, at), np.where(same, fresh, normal), share * (1 - 0.5 * ~same)
         further = _onto_planes(place, at, normal, corner, other)
     return further

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..linalg import cross, lengths, symmetric
+from ..linalg import cross, lengths, row_dots, symmetric
 from ..parallel import over_rows
 from .mesh import AT_ONCE, at_corners, edges_of
 
@@ -30,7 +30,7 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     for _ in range(_ROUNDS):
         step = links @ moved
         step -= here
-        step -= np.einsum("vi,vi->v", step, normal)[:, None] * normal
+        step -= row_dots(step, normal)[:, None] * normal
         step *= _DAMPING
         here += step
         moved[free] = here

@@ -83,9 +83,9 @@ def _along(axis, ahead, sheets, x, cell, hair):
     tail, head = tail[mutual], head[mutual]
 
     a, b = sheets.axis[tail], sheets.axis[head]
-    b = b * np.where(np.einsum("ei,ei->e", a, b) < 0, -1.0, 1.0)[:, None]
-    below = np.einsum("ei,ei->e", x[sheets.node[tail]] - sheets.foot[tail] + hair, a)
-    above = np.einsum("ei,ei->e", x[sheets.node[head]] - sheets.foot[head] + hair, b)
+    b = b * np.where(row_dots(a, b) < 0, -1.0, 1.0)[:, None]
+    below = row_dots(x[sheets.node[tail]] - sheets.foot[tail] + hair, a)
+    above = row_dots(x[sheets.node[head]] - sheets.foot[head] + hair, b)
     share = np.abs(below) / np.maximum(np.abs(below) + np.abs(above), np.finfo(float).tiny)
     place = x[sheets.node[tail]] + (share * cell)[:, None] * np.eye(3)[axis]
     normal = (a + b) / np.linalg.norm(a + b, axis=1, keepdims=True)
@@ -116,8 +116,8 @@ def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell):
         row = np.flatnonzero((count[sheets.node[near]] > i) & (other != near))
         own, other = near[row], other[row]
         axis, foot = sheets.axis[other], sheets.foot[other]
-        ends = (sheets.beyond[other] <= _CUTS * cell) & (np.abs(np.einsum("ei,ei->e", axis, normal[row])) < _ACROSS)
-        height = np.einsum("ei,ei->e", place[row] - foot, axis)
+        ends = (sheets.beyond[other] <= _CUTS * cell) & (np.abs(row_dots(axis, normal[row])) < _ACROSS)
+        height = row_dots(place[row] - foot, axis)
         up = np.where(height < 0, -1.0, 1.0)
         heights = np.einsum("eki,ei->ek", surface.points[sheets.sample[own]] - foot[:, None], axis) * up[:, None]
         member = sheets.member[own] > MEMBER
@@ -126,7 +126,7 @@ def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell):
         cut[row[ends & ~this_side]] = True
         gap = np.where(member, np.abs(heights), np.inf).min(axis=1)
         out = sheets.outward[own]
-        straight = -up * np.einsum("ei,ei->e", out, axis) > _STRAIGHT * np.linalg.norm(out, axis=1)
+        straight = -up * row_dots(out, axis) > _STRAIGHT * np.linalg.norm(out, axis=1)
         short = (gap < _GAP * spacing) & (np.abs(height) <= np.minimum(_STEP * spacing, _FAR * cell))
         covered[row[ends & this_side & straight & short]] = True
     return covered & ~cut

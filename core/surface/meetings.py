@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER, TRUSTED, membership
-from ..linalg import dots
+from ..linalg import dots, row_dots
 from ..lookup import numbered
 from ..parallel import even_chunks, in_order, over_rows
 from ..progress import Progress
@@ -36,7 +36,7 @@ def meetings(surface: LocalSurface, progress=None) -> np.ndarray:
     if not len(i):
         return np.zeros(n, bool)
     apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
-    cosine = np.abs(np.einsum("mi,mi->m", surface.normals[i], surface.normals[j]))
+    cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
     askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
     apart[askew] = _goes_past(i[askew], j[askew], surface)
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))

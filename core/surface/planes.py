@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..linalg import solve_positive
+from ..linalg import row_dots, solve_positive
 
 
 def to_planes(vertices, corner, place, normal, stiffness: float) -> np.ndarray:
@@ -11,7 +11,7 @@ def to_planes(vertices, corner, place, normal, stiffness: float) -> np.ndarray:
     corner    : (c,) int, the vertex that each plane belongs to     place, normal : (c,3), a point of it and its normal
     stiffness : of vertices against moving along what their planes leave open, beside 1 of a plane
     """
-    offset = np.einsum("ci,ci->c", normal, place - vertices[corner])
+    offset = row_dots(normal, place - vertices[corner])
     matrix = np.zeros((len(vertices), 3, 3))
     right = np.zeros((len(vertices), 3))
     for a in range(3):

@@ -14,7 +14,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ..field.local_surface import LocalSurface
-from ..linalg import COMPONENTS, cross, lengths, principal_axes
+from ..linalg import COMPONENTS, cross, lengths, principal_axes, row_dots
 from .mesh import Mesh, at_corners, edge_numbers
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
@@ -36,7 +36,7 @@ def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     if not len(loop):
         return mesh.vertices
     way, axis, vertices = way[loop], _axes(mesh, loop), mesh.vertices.copy()
-    way -= np.einsum("li,li->l", way, axis)[:, None] * axis
+    way -= row_dots(way, axis)[:, None] * axis
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
     step = cell * way - surface.project(vertices[loop] + cell * way).step
     length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -67,7 +67,7 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
         vertices[loop] = at[loop]
     spacing = surface.spacing[surface.tree.query(vertices[loop], workers=-1)[1]]
     step = _fairing(vertices, loop, beside, spacing, cell)
-    step -= np.einsum("li,li->l", step, axis)[:, None] * axis
+    step -= row_dots(step, axis)[:, None] * axis
     length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(float).tiny)
     vertices[loop] += step * np.minimum(1.0, _FARTHEST * spacing / length)[:, None]
     _settle(vertices, loop, axis, surface)
@@ -84,7 +84,7 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     vertices[row] += spsolve((diags(degree) - graph[:, row]).tocsc(), graph @ moved)
     for _ in range(_RELAXED):
         step = _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
-        vertices[row] += step - np.einsum("vi,vi->v", step, axis)[:, None] * axis
+        vertices[row] += step - row_dots(step, axis)[:, None] * axis
     _settle(vertices, row, axis, surface)
     return replace(mesh, vertices=vertices)
 
@@ -96,9 +96,9 @@ def _outward(vertices, faces):
     border = (count[edge] == 1).reshape(-1)
     tail, head, third = tail[border], head[border], third[border]
     along = vertices[head] - vertices[tail]
-    squared = np.maximum(np.einsum("ei,ei->e", along, along), np.finfo(float).tiny)
+    squared = np.maximum(row_dots(along, along), np.finfo(float).tiny)
     out = vertices[tail] - vertices[third]
-    out -= (np.einsum("ei,ei->e", out, along) / squared)[:, None] * along
+    out -= (row_dots(out, along) / squared)[:, None] * along
     out *= (np.sqrt(squared) / np.maximum(np.linalg.norm(out, axis=1), np.finfo(float).tiny))[:, None]
     ends = np.concatenate([tail, head])
     return np.stack([np.bincount(ends, np.tile(out[:, a], 2), len(vertices)) for a in range(3)], axis=1)
@@ -156,4 +156,4 @@ def _grown(chosen, graph, rows):
 def _settle(vertices, row, axis, surface):
     """Take the vertices `row` (r,) back onto the surface along their normals (r,3), in place, past its rims too."""
     step = surface.project(vertices[row]).step
-    vertices[row] -= np.einsum("vi,vi->v", step, axis)[:, None] * axis
+    vertices[row] -= row_dots(step, axis)[:, None] * axis

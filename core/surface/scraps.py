@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
+from ..linalg import row_dots
 from .mesh import Mesh, edge_numbers, in_use
 
 _SMALL = 32  # faces of a patch
@@ -106,6 +107,6 @@ def _is_spur(mesh, face, edge, counts, cell):
     start, stop = mesh.vertices[tail[line]], mesh.vertices[head[line]]
     x = mesh.vertices[np.unique(tail)]
     along = stop - start
-    share = np.einsum("vli,li->vl", x[:, None] - start, along) / np.maximum((along**2).sum(axis=1), 1e-300)
+    share = row_dots(x[:, None] - start, along) / np.maximum((along**2).sum(axis=1), 1e-300)
     foot = start + np.clip(share, 0, 1)[..., None] * along
     return (np.linalg.norm(x[:, None] - foot, axis=2).min(axis=1) <= _PAST * cell).all()

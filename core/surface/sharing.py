@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.grid import Grid, node_strides
+from ..linalg import row_dots
 from ..lookup import numbered
 from .crossings import Crossings
 
@@ -64,8 +65,8 @@ def _compare(crossings, a, b, cell):
         np.where(known[0], crossings.normal[a], crossings.normal[b]),
         np.where(known[1], crossings.normal[b], crossings.normal[a]),
     )
-    off = np.maximum(*(np.abs(np.einsum("mi,mi->m", gap, normal)) for normal in normals))
-    level = np.abs(np.einsum("mi,mi->m", *normals)) > _STEEP
+    off = np.maximum(*(np.abs(row_dots(gap, normal)) for normal in normals))
+    level = np.abs(row_dots(*normals)) > _STEEP
     meet = ~level & (known[0] & known[1])[:, 0]
     return (off <= _BENT * length + _OFF * cell) & ~meet, meet
 

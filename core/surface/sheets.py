@@ -11,6 +11,7 @@ import numpy as np
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import CHUNK, MEMBER, TRUSTED, seen_from, sheet_foot
+from ..linalg import row_dots
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
 
@@ -84,8 +85,8 @@ def sheets_near(
 def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray]:
     """Whether the pairs of rows a and b, (p,) each, lie on one sheet, (p,) bool, and how far off they are, (p,)."""
     axes, gap = (sheets.axis[a], sheets.axis[b]), sheets.foot[a] - sheets.foot[b]
-    cosine = np.abs(np.einsum("pi,pi->p", *axes))
-    off = np.maximum(*(np.abs(np.einsum("pi,pi->p", gap, axis)) for axis in axes))
+    cosine = np.abs(row_dots(*axes))
+    off = np.maximum(*(np.abs(row_dots(gap, axis)) for axis in axes))
     limit = _BENT * np.linalg.norm(gap, axis=1) + _OFF * cell
     return (cosine > ALIKE) & (off <= limit), off / cell + 1 - cosine
 
@@ -122,7 +123,7 @@ def _distinct(sheets, surface, nodes, cell):
         for j in range(i + 1, count.max(initial=0)):
             one = first[count > j] + i
             other = one - i + j
-            cosine = np.abs(np.einsum("pi,pi->p", sheets.axis[one], sheets.axis[other]))
+            cosine = np.abs(row_dots(sheets.axis[one], sheets.axis[other]))
             spacing = surface.spacing[sheets.sample[one, sheets.anchor[one]]]
             near = np.linalg.norm(sheets.foot[one] - sheets.foot[other], axis=1)
             same = (cosine > _SAME_ANGLE) & (near < np.maximum(_SAME_FOOT[0] * cell, _SAME_FOOT[1] * spacing))

@@ -7,6 +7,7 @@ import numpy as np
 from ..field.blocks import Blocks, at_nodes
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
+from ..linalg import row_dots
 from ..progress import Progress
 from .corners import into_corners
 from .evening import FLAT, vertex_normals
@@ -54,7 +55,7 @@ def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress
         way = outward * normal[bent]
         found = surface.project(vertices[bent] + _ASIDE * cell * way, part.part(0.0, 0.5))
         direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
-        clear = back & (np.einsum("vi,vi->v", direction, way) > 0) & ~found.past_rim
+        clear = back & (row_dots(direction, way) > 0) & ~found.past_rim
         side[bent[clear]] = direction[clear]
         known = side.any(axis=1)
         beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]

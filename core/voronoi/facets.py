@@ -21,6 +21,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import Delaunay
 
+from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .blocks import overlapping_blocks
@@ -148,7 +149,7 @@ def _sides(sites, spacing, radius, block):
     i, j = np.minimum(a, b), np.maximum(a, b)
     owner = np.where(spacing[j] > spacing[i], j, i)
     step = sites[j] - sites[i]
-    length = np.sqrt(dot(step, step))
+    length = np.sqrt(row_dots(step, step))
     kept = np.flatnonzero(own[owner] & (length <= REACH * spacing[owner]))
     i, j, step, length, near, far = i[kept], j[kept], step[kept], length[kept], near[kept], far[kept]
     outward = (a[kept] == i) == positive[near]
@@ -171,23 +172,19 @@ def clip_radius(spacing, i, j):
 def inside_ball(sides: FacetSides) -> tuple[np.ndarray, np.ndarray]:
     """Where each side enters and leaves the ball, both (s,) in [0,1] from tail to head; equal where it stays out."""
     step = sides.head - sides.tail
-    a, b = dot(step, step), dot(step, sides.tail)
-    discriminant = b * b - a * (dot(sides.tail, sides.tail) - sides.radius**2)
+    a, b = row_dots(step, step), row_dots(step, sides.tail)
+    discriminant = b * b - a * (row_dots(sides.tail, sides.tail) - sides.radius**2)
     root, a = np.sqrt(np.maximum(discriminant, 0.0)), np.maximum(a, np.finfo(np.float64).tiny)
     hit = discriminant > 0
     return np.where(hit, np.clip((-b - root) / a, 0, 1), 0.0), np.where(hit, np.clip((-b + root) / a, 0, 1), 0.0)
-
-
-def dot(a, b):
-    return np.einsum("ij,ij->i", a, b)
 
 
 def _swept_area(sides):
     """Signed area, inside the ball, of the triangle between the midpoint and each side: a triangle over the part of
     the side that is inside, a circular sector over each part that is not."""
     enter, leave = inside_ball(sides)
-    tt, th, hh = dot(sides.tail, sides.tail), dot(sides.tail, sides.head), dot(sides.head, sides.head)
-    turn = dot(np.cross(sides.tail, sides.head), sides.axis)
+    tt, th, hh = row_dots(sides.tail, sides.tail), row_dots(sides.tail, sides.head), row_dots(sides.head, sides.head)
+    turn = row_dots(np.cross(sides.tail, sides.head), sides.axis)
     before = np.arctan2(enter * turn, (1 - enter) * tt + enter * th)
     after = np.arctan2((1 - leave) * turn, (1 - leave) * th + leave * hh)
     return 0.5 * (sides.radius**2 * (before + after) + (leave - enter) * turn)
@@ -207,8 +204,8 @@ def _circumcentres(sites, simplices):
     origin = sites[simplices[:, 0]]
     a, b, c = (sites[simplices[:, k]] - origin for k in (1, 2, 3))
     bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
-    volume = dot(a, bc)
-    numerator = dot(a, a)[:, None] * bc + dot(b, b)[:, None] * ca + dot(c, c)[:, None] * ab
+    volume = row_dots(a, bc)
+    numerator = row_dots(a, a)[:, None] * bc + row_dots(b, b)[:, None] * ca + row_dots(c, c)[:, None] * ab
     positive = volume >= 0
     flat = np.finfo(np.float64).tiny
     safe = np.where(np.abs(volume) < flat, np.where(positive, flat, -flat), volume)

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..linalg import row_dots
 from ..lookup import rows_of
-from .facets import Facets, by_blocks, clip_radius, dot, facets_of, inside_ball, joined
+from .facets import Facets, by_blocks, clip_radius, facets_of, inside_ball, joined
 
 _ARC_STEP = 0.25  # radians; longest chord that stands for a piece of the clip circle
 _SAME_ANGLE = 1e-9  # radians
@@ -95,7 +96,7 @@ class _Frame:
         return cls(0.5 * (points[i] + points[j]), e1, np.cross(axis, e1), clip_radius(spacing, i, j))
 
     def angle(self, vectors, facet):
-        return np.arctan2(dot(vectors, self.e2[facet]), dot(vectors, self.e1[facet]))
+        return np.arctan2(row_dots(vectors, self.e2[facet]), row_dots(vectors, self.e1[facet]))
 
     def on_circle(self, angle, facet):
         unit = np.cos(angle)[:, None] * self.e1[facet] + np.sin(angle)[:, None] * self.e2[facet]

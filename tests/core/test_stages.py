@@ -67,9 +67,11 @@ def test_stages_alone_refuse_what_a_run_refuses():
     spacing, grid = local_spacing(points), fit_grid(points, 16)
     with pytest.raises(SettingsError, match="resolution is 0"):
         fit_grid(points, 0)
-    for nothing in ([], "abc", np.empty((0, 3)), points[:, :2]):
-        with pytest.raises(InputError, match=r"a grid needs an \(n,3\) array"):
+    for nothing in ([], "abc", points[:, :2], [[0, 0, 0], [1, 1]], points + 1j):
+        with pytest.raises(InputError, match=r"give an \(n,3\) array"):
             fit_grid(nothing, 16)
+    with pytest.raises(InputError, match="0 points given; at least 1"):
+        fit_grid(np.empty((0, 3)), 16)
     with pytest.raises(SettingsError, match="denoise is 5"):
         denoise(points, spacing, 5)
     for row in (300, -1):
