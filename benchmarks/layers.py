@@ -32,16 +32,19 @@ _PAGE = """\
 Made by `python -m benchmarks.layers FOLDER`, which writes this page and the numbers behind it
 ([numbers.json](layers/numbers.json)); do not edit it by hand.
 
-Both layers are pulled onto the surface, and where it bends their triangles are other chords of it. So each is taken to
-its own side of the surface, by as much as its faces dip through it, and where the mesh bends sharply by what either
-lacks to clear the other. A viewer that colours back faces shows layers that cross as speckles, and programs that ask
-for meshes that do not cross themselves refuse them.
+Where the single layer has two sides, the layers are these sides, a hair apart: 3e-4 cells. Elsewhere (sheets meet, the
+surface is one-sided, points are sparse or dense) they are extracted at an offset and pulled onto the surface, and where
+it bends their triangles are other chords of it. So each is taken to its own side of the surface, by as much as its
+faces dip through it, and where the mesh bends sharply by what either lacks to clear the other. A viewer that colours
+back faces shows layers that cross as speckles, and programs that ask for meshes that do not cross themselves refuse
+them.
 
 *Gap*: how far the layer behind lies from points of the other, percentiles in cells; negative where it lies in front.
 *Crossed*: share of the points where it does: along lines where the surface itself crosses, and where points are too few
-to tell thin parts from folds. *Astride*: the same with each face put astride the surface, as it is where the median
-distance of the points is less than two thirds of a cell ({dense}): then errors of the chords are most of all there are,
-and twice as large for layers that lie apart. CD is times 1000, in the scale of the case.
+to tell thin parts from folds. *Astride*: the same for layers extracted at an offset with each face put astride the
+surface, as it is where the median distance of the points is less than two thirds of a cell: then errors of the chords
+are most of all there are, and twice as large for layers that lie apart. There, and of the sides of a single layer,
+whose faces lie astride as well, the column is empty. CD is times 1000, in the scale of the case.
 
 | case | points | crossed | {percentiles} | crossed, astride | CD | CD astride | ratio |
 | --- | --- | ---: | {rules} | ---: | ---: | ---: | ---: |
@@ -74,8 +77,8 @@ def layers_of(path: Path, sampling: str) -> dict:
     apart = _told(case)
     with patch.object(double_cover, "laid_apart", lambda mesh, *_: centred(mesh)):
         astride = _told(case)
-    told = {f"{name}_astride": astride[name] for name in ("crossed", "cd")}
-    return {"case": path.stem, "sampling": sampling, **apart, **told, "dense": apart == astride}
+    told = {f"{name}_astride": None if apart == astride else astride[name] for name in ("crossed", "cd")}
+    return {"case": path.stem, "sampling": sampling, **apart, **told}
 
 
 def _told(case):
@@ -117,7 +120,6 @@ def write_page(rows: list[dict], docs: Path) -> Path:
         percentiles=" | ".join(f"gap, {p} %" for p in PERCENTILES),
         rules=" | ".join("---:" for _ in PERCENTILES),
         rows="\n".join(map(_row, rows)),
-        dense=", ".join(sorted({row["case"] for row in rows if row["dense"]})) or "none of these",
     )
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -126,10 +128,12 @@ def write_page(rows: list[dict], docs: Path) -> Path:
 
 def _row(row):
     gap = " | ".join(f"{value:.4f}" for value in row["gap"])
-    return (
-        f"| {row['case']} | {row['sampling']} | {row['crossed']:.2%} | {gap} | {row['crossed_astride']:.1%} | "
-        f"{row['cd']:.3f} | {row['cd_astride']:.3f} | {row['cd'] / row['cd_astride']:.2f} |"
-    )
+    cd, astride = row["cd"], row["cd_astride"]
+    crossed, *errors = ("–",) * 3
+    if astride is not None:
+        crossed, *errors = f"{row['crossed_astride']:.1%}", f"{astride:.3f}", f"{cd / astride:.2f}"
+    cells = [row["case"], row["sampling"], f"{row['crossed']:.2%}", gap, crossed, f"{cd:.3f}", *errors]
+    return f"| {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ _PUBLIC = {
     "reconstruction": ("Reconstruction",),
     "settings": ("Settings",),
     "surface.attributes": ("vertex_attributes",),
+    "surface.both_sides": ("both_sides",),
     "surface.crossings": ("find_crossings",),
     "surface.double_cover": ("double_cover",),
     "surface.mesh": ("Mesh",),

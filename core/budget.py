@@ -25,8 +25,8 @@ _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
 _MESHES = {"none": 0.0, "double": 3.0e-3, "single": 3.6e-3, "both": 6e-3, "signed": 3.6e-3}
 
-# The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
-_BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
+# The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, without a mesh or with.
+_BAND_MEMORY = {"field": 60.0, "field alone": 3.2e-3, "meshes": 3.6e-3}  # MiB
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
 # Processor seconds where the probe takes _PROBE of them; fitted to 41 runs over 500 to 20,000 samples at resolutions of
@@ -34,7 +34,7 @@ _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected i
 _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
 _NEAR_NODE, _NODE = 2.4e-6, 5e-8
 _BAND_NEAR_NODE, _BAND_NODE = 4.8e-6, 1.5e-6
-_COVER, _SIDES = 2.9e-5, 5.6e-5  # for a squared cell of the surface: its double cover, and one with its sides told
+_COVER, _SIDES = 2.9e-5, 5.6e-5  # for a squared cell of the surface: its double cover alone, and a single layer
 _PROBE = 0.0042
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
@@ -59,7 +59,7 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
     cells, nodes = spacing / grid.spacing, float(np.prod(grid.shape))
     area, sides = float(np.sum(cells**2)), settings.surface in WITH_SIDES
     work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing)
-    work += area * (_SIDES * sides + _COVER * (settings.surface in ("double", "both")))
+    work += area * (_SIDES if sides else _COVER * (settings.surface == "double"))
     if settings.band is None:
         near = min(nodes, 2.0 * float(np.sum(cells**2 * (_NEAR + cells))))
         work += _NEAR_NODE * near + _NODE * nodes
@@ -115,7 +115,7 @@ def _memory(samples, area, nodes, settings):
     least, each = _by_samples(settings)
     diagram, by_cores = least + each * samples, _CORE * max(0, cores() - 2)
     if settings.band is not None:
-        kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
+        kind = "field alone" if settings.surface == "none" else "meshes"
         return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
     node = _POISSON_NODE if settings.integration == "poisson" else _MEMORY["node"]
     field = _MEMORY["field"] + node * nodes

@@ -55,8 +55,10 @@ class Settings:
     )
     offset: float = _option(
         1.0,
-        "Distance at which the two layers of the surface are first extracted, before they are pulled onto it; more "
-        "where points are over three cells apart. Larger tolerates rougher fields, smaller separates closer sheets",
+        "Distance at which the two layers of the double cover are first extracted, before they are pulled onto the "
+        "surface, where they are not the two sides of a single layer: where sheets meet, the surface is one-sided, or "
+        "points are over five cells apart; at more where they are over three. Larger tolerates rougher fields, smaller "
+        "separates closer sheets",
         limits=(0.5, 4.0),
         unit="cells",
     )
@@ -69,8 +71,8 @@ class Settings:
     )
     faces: str = _option(
         "triangles",
-        "What meshes are made of: triangles, or quads along the grid's axes, for subdivision and sculpting; a single "
-        "layer keeps a few triangles where it ends or sheets meet",
+        "What meshes are made of: triangles, or quads along the grid's axes, for subdivision and sculpting; a few "
+        "triangles are kept where a surface ends and where sheets of a single layer meet",
         choices=("triangles", "quads"),
     )
     pieces: float = _option(

@@ -26,6 +26,7 @@ from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .first_steps import first_steps
 from .meeting_edges import meeting_edges
+from .meetings import Meetings, find_meetings
 from .mending import mend, odd_faces
 
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
@@ -66,11 +67,14 @@ class Crossings:
         return edge[count % 2 == 1]
 
 
-def find_crossings(band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Crossings:
-    """Crossings of the zero set, from the nodes near it. On the way edges are called 3 * row + axis, by the row of the
-    lower node in the band."""
+def find_crossings(
+    band: NearBand, surface: LocalSurface, grid: Grid, progress=None, meetings: Meetings | None = None
+) -> Crossings:
+    """Crossings of the zero set, from the nodes near it, and the `meetings` of sheets where these are known already.
+    On the way edges are called 3 * row + axis, by the row of the lower node in the band."""
     progress = Progress.of(progress)
-    meet = meeting_edges(band, surface, grid, _HAIR * grid.spacing, progress.part(0.0, 0.4))
+    meetings = meetings or find_meetings(surface, progress.part(0.0, 0.1))
+    meet = meeting_edges(band, surface, grid, meetings, _HAIR * grid.spacing, progress.part(0.1, 0.4))
     progress(0.4)
     lowest, corner = band.whole_cells(np.arange(len(band.node)))
     once, twice = (each[_in_whole_cells(band, lowest, meet.edge[each])] for each in _once(meet))

@@ -24,12 +24,12 @@ from .spanning import spanned, spanning_vertices
 from .triangles import mesh_of
 
 CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made background
-_SPARSE = 3.0  # cells, median local spacing above which the iso-surface is taken further off
+SPARSE = 3.0  # cells, median local spacing above which the iso-surface is taken further off
 _RAISED = 0.5  # cells further for each cell of it above that
 _WITHIN = 0.75  # of the box's padding, at most
 _CLOSEST = 0.51  # cells; at half a cell a sheet midway between nodes has none below the level
 _LONGEST_STEP = 2.0  # levels
-_DENSE = 2 / 3  # cells, median local spacing
+DENSE = 2 / 3  # cells, median local spacing
 
 
 def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
@@ -43,7 +43,7 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     room = padding_cells(max(grid.shape) - 1)
     if not 0 < offset <= room:
         raise SettingsError(f"offset is {offset:g}; it must be above 0 and at most {room:g} cells, the room in the box")
-    raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - _SPARSE)
+    raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - SPARSE)
     return max(offset, _CLOSEST, min(raised, _WITHIN * room))
 
 
@@ -94,7 +94,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = spanned(vertices, faces, loose)
     mesh = mesh_of(vertices, faces)
     progress(0.8)
-    dense = np.median(surface.spacing) < _DENSE * grid.spacing
+    dense = np.median(surface.spacing) < DENSE * grid.spacing
     mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)

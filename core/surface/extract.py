@@ -1,6 +1,7 @@
 """Stage three: the meshes that were asked for."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,19 +11,23 @@ from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
 from ..settings import WITH_SIDES, Settings
-from .crossings import find_crossings
-from .double_cover import CLAMP, double_cover, level_for
+from .both_sides import both_sides
+from .crossings import Crossings, find_crossings
+from .double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
 from .isosurface import need_quads
+from .meetings import Meetings, find_meetings
 from .mesh import Mesh
 from .misfit import misfit
 from .pieces import without_small_pieces
-from .sides import find_sides, needed_band
+from .sides import Sides, find_sides, may_be_closed, needed_band
 from .signed import signed_distance, signed_mesh
-from .single_layer import single_layer
+from .single_layer import sheet_of_crossings, sheet_of_sides
 
 _TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
 _BETTER = 0.5  # times that distance, below which it is taken
-_SPARSE = 3.0  # cells, median local spacing from which no finer grid parts what the points do not
+_SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
+_FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
+_THROUGH = 0.125  # of those, at least: sheets that pass through each other
 
 
 @dataclass(frozen=True)
@@ -49,18 +54,90 @@ class Surfaces:
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
     needed = settings.band
-    if settings.surface in WITH_SIDES:
+    if settings.surface in WITH_SIDES or (settings.surface == "double" and _even(local, grid)):
         needed = max(needed, needed_band(local, grid))
     if settings.surface in ("double", "both", "single"):
         needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
     return needed
 
 
+@dataclass(frozen=True)
+class _Layers:
+    """What meshes are made of, each found when it is first asked for."""
+
+    values: np.ndarray | Blocks
+    band: NearBand
+    local: LocalSurface
+    grid: Grid
+    offset: float
+    progress: Progress
+
+    @cached_property
+    def meetings(self) -> Meetings:
+        return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"))
+
+    @cached_property
+    def crossings(self) -> Crossings:
+        part = self.progress.part(0.05, 0.2, "crossings")
+        return find_crossings(self.band, self.local, self.grid, part, self.meetings)
+
+    @cached_property
+    def sides(self) -> Sides:
+        part = self.progress.part(0.2, 0.3, "crossings")
+        return find_sides(self.values, self.crossings, self.local, self.grid, part)
+
+    @cached_property
+    def sheet(self) -> Mesh | None:
+        """The single layer of a surface with two sides."""
+        part = self.progress.part(0.3, 0.5, "single layer")
+        return sheet_of_sides(self.values, self.band, self.crossings, self.sides, self.local, self.grid, part)
+
+    @cached_property
+    def single(self) -> tuple[Mesh, int]:
+        """The single layer of any surface, and the number of its edges that cannot be wound alike."""
+        if self.sheet is not None:
+            return self.sheet, 0
+        part = self.progress.part(0.5, 0.7, "single layer")
+        return sheet_of_crossings(self.values, self.band, self.crossings, self.local, self.grid, part)
+
+    @cached_property
+    def off(self) -> float:
+        """How far samples are from the single layer on average; 0 where that bounds the inside."""
+        return 0.0 if self.sides.complete else misfit(self.single[0], self.local.points)
+
+    @property
+    def torn(self) -> bool:
+        return self.off > _TORN * self.grid.spacing
+
+    @cached_property
+    def cover(self) -> Mesh:
+        """The double cover: both sides of the single layer, where these are the whole surface."""
+        if self._may_be_sheet() and self.sheet is not None and not self.torn:
+            return both_sides(self.sheet, self.grid.spacing)
+        part = self.progress.part(0.7, 1.0, "double cover")
+        return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
+
+    def _may_be_sheet(self):
+        """Whether to look for a single layer with two sides. Sheets that meet have none, but a closed shape does whose
+        walls run close, or whose corners look like meetings."""
+        if not _even(self.local, self.grid):
+            return False
+        if self.meetings.share <= _FEW:
+            return True
+        return self.meetings.through < _THROUGH and may_be_closed(self.values, self.local, self.grid)
+
+
+def _even(local, grid):
+    """Whether samples are neither so dense that chords are most of the error, of which two layers extracted apart have
+    less, nor so sparse that a single layer may have handles."""
+    return DENSE <= np.median(local.spacing) / grid.spacing <= _SPARSEST
+
+
 def _said_of_torn(local, grid):
     """Why there is a double cover in place of a single layer, and what helps: no finer grid where points lie many cells
     apart."""
     cells = np.median(local.spacing) / grid.spacing
-    if cells > _SPARSE:
+    if cells > SPARSE:
         return (
             f"points {cells:.2g} cells apart are too few to tell sheets apart, where a single layer is torn: the "
             "double cover is in its place; more points part them"
@@ -77,6 +154,10 @@ def extract_surfaces(
     """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
     :func:`band_for` says, and the nodes near the surface.
 
+    The double cover is both sides of the single layer, see :mod:`.both_sides`, where that has two, unless sheets meet
+    or pass through each other, or samples are sparse or very dense; else it is extracted at an offset, see
+    :mod:`.double_cover`.
+
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,
     :class:`MissingDependency` where quads are asked for and OpenVDB is not found.
@@ -85,35 +166,27 @@ def extract_surfaces(
     meshes, dropped, warnings = {}, {}, []
     if settings.faces == "quads" and kind != "none":
         need_quads()
+    layers = _Layers(values, band, local, grid, settings.offset, progress)
     if kind in ("double", "both"):
-        part = progress.part(0.0, 0.3, "double cover")
-        meshes["double"] = double_cover(values, band, local, grid, settings.offset, part)
-    if kind in WITH_SIDES:
-        crossings = find_crossings(band, local, grid, progress.part(0.3, 0.5, "crossings"))
-        sides = find_sides(values, crossings, local, grid, progress.part(0.5, 0.6, "crossings"))
+        meshes["double"] = layers.cover
     if kind in ("single", "both"):
-        part = progress.part(0.6, 0.9, "single layer")
-        meshes["single"], unoriented = single_layer(values, band, crossings, sides, local, grid, part)
-        torn = 0.0 if sides.complete else misfit(meshes["single"], local.points)
-        if torn > _TORN * grid.spacing:
-            part = progress.part(0.9, 1.0, "single layer")
-            cover = meshes.get("double") or double_cover(values, band, local, grid, settings.offset, part)
-            if misfit(cover, local.points) < _BETTER * torn:
-                meshes["single"], unoriented = cover, 0
-                warnings.append(_said_of_torn(local, grid))
+        meshes["single"], unoriented = layers.single
+        if layers.torn and misfit(layers.cover, local.points) < _BETTER * layers.off:
+            meshes["single"], unoriented = layers.cover, 0
+            warnings.append(_said_of_torn(local, grid))
         if unoriented:
             warnings.append(
                 f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "
                 "there, or sheets meet; use the double cover where both sides must show"
             )
     if kind == "signed":
-        values = signed_distance(values, sides, local, place)
+        values = signed_distance(values, layers.sides, local, place)
         meshes["signed"] = signed_mesh(values, local, grid, progress.part(0.6, 1.0, "signed surface"))
-        if not sides.complete:
+        if not layers.sides.complete:
             warnings.append(
-                f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where the "
-                f"signed surface has a face on either side; it spans openings of {sides.spanned:.1%} of its area; "
-                "compare it with the single layer"
+                f"{layers.sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "
+                f"the signed surface has a face on either side; it spans openings of {layers.sides.spanned:.1%} of its "
+                "area; compare it with the single layer"
             )
     for kind, mesh in meshes.items():
         mesh = mesh if settings.faces == "quads" else replace(mesh, pairs=0)

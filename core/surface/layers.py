@@ -15,7 +15,7 @@ from ..progress import Progress
 from .centring import Bend, bend_of
 from .mesh import Mesh, at_corners
 
-_HAIR = 3e-4  # cells, between the layers
+HAIR = 3e-4  # cells, between the layers
 _SHIFT = 0.5  # cells, by which layers are held apart in looking for faces of the other
 _NEAREST = 8  # faces that are tried
 _AROUND = 2.0  # cells, of a place, within which faces are looked at
@@ -38,7 +38,7 @@ def laid_apart(mesh: Mesh, cell: float, progress=None) -> Mesh:
     progress, bend, dip = Progress.of(progress), bend_of(mesh), np.zeros(len(mesh.vertices))
     progress(0.2)
     np.maximum.at(dip, mesh.faces.reshape(-1), np.repeat(np.maximum(bend.at_centroids(), bend.at_edges()), 3))
-    return _cleared(bend.moved(mesh, dip + _HAIR * cell), bend, cell, progress.part(0.4, 1.0))
+    return _cleared(bend.moved(mesh, dip + HAIR * cell), bend, cell, progress.part(0.4, 1.0))
 
 
 def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
@@ -48,7 +48,7 @@ def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
     place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
     behind, face = _other_layer(mesh, place, outward, cell, progress)
-    lack = 0.5 * np.maximum(_HAIR * cell - behind, 0.0)
+    lack = 0.5 * np.maximum(HAIR * cell - behind, 0.0)
     step = np.zeros(len(mesh.vertices))
     for corner in (*ends, *mesh.faces[face].T):
         np.maximum.at(step, corner, lack)

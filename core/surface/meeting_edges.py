@@ -10,7 +10,7 @@ from ..field.projection import MEMBER
 from ..field.steps import NearBand
 from ..linalg import row_dots
 from ..progress import Progress
-from .meetings import meetings
+from .meetings import Meetings
 from .sheets import Sheets, one_sheet, sheets_near
 
 _NEAR = 1.4  # cells, from the surface to the nodes that are looked at
@@ -44,19 +44,21 @@ class MeetingEdges:
     zone: np.ndarray
 
 
-def meeting_edges(band: NearBand, surface: LocalSurface, grid: Grid, hair, progress=None) -> MeetingEdges:
-    """Edges between nodes close to the surface whose nearest sample is where sheets meet; `hair` (3,) decides the side
-    of nodes that lie on a sheet."""
+def meeting_edges(
+    band: NearBand, surface: LocalSurface, grid: Grid, meet: Meetings, hair, progress=None
+) -> MeetingEdges:
+    """Edges between nodes close to the surface whose nearest sample is where sheets `meet`; `hair` (3,) decides the
+    side of nodes that lie on a sheet."""
     progress, cell = Progress.of(progress), grid.spacing
     row = np.flatnonzero(row_dots(band.step, band.step) <= (_NEAR * cell) ** 2)
-    row = row[meetings(surface, progress.part(0.0, 0.3))[band.sample[row]]]
+    row = row[meet.at[band.sample[row]]]
     if not len(row):
         none, nowhere = np.empty(0, np.int64), np.empty((0, 3))
         return MeetingEdges(none, nowhere, nowhere, np.empty(0, bool), np.empty(0), none)
     x, number = grid.positions(band.node[row]), np.full(len(band.node) + 1, -1)
     number[row] = np.arange(len(row))
     ahead, back = number[band.ahead[:, row]], number[band.behind[:, row]]
-    sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.3, 0.9))
+    sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.0, 0.9))
     found = [_along(axis, ahead[axis], sheets, x, cell, hair) for axis in range(3)]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
     one, place, normal, crossed, certainty, beyond, near = (np.concatenate(part) for part in zip(*found, strict=True))

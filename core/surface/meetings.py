@@ -5,6 +5,8 @@ is on the other's tangent plane, where no sample between them lies on one sheet 
 sheets either run side by side or one goes on past the other's plane; where most pairs of a neighbourhood do.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import csr_matrix
 
@@ -24,8 +26,25 @@ _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 
 
-def meetings(surface: LocalSurface, progress=None) -> np.ndarray:
-    """(n,) bool: samples in whose neighbourhood there are several sheets."""
+@dataclass(frozen=True)
+class Meetings:
+    """Samples in whose neighbourhood there are several sheets.
+
+    at      : (n,) bool
+    through : float, as a share of those, the samples of sheets that pass through one another
+    """
+
+    at: np.ndarray
+    through: float
+
+    @property
+    def share(self) -> float:
+        """Of all samples."""
+        return float(self.at.mean())
+
+
+def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
+    """Where sheets meet, cross or run close, from the samples alone."""
     progress, n = Progress.of(progress), len(surface.points)
     nearest, member = _members(surface, np.arange(n), NEIGHBOURS + 1, progress)
     alike = member > MEMBER
@@ -34,13 +53,16 @@ def meetings(surface: LocalSurface, progress=None) -> np.ndarray:
     i, at = np.nonzero(unlike)
     j = nearest[i, at]
     if not len(i):
-        return np.zeros(n, bool)
+        return Meetings(np.zeros(n, bool), 0.0)
     apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
     cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
     askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
-    apart[askew] = _goes_past(i[askew], j[askew], surface)
+    past = _goes_past(i[askew], j[askew], surface)
+    apart[askew] = past > 0
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
-    return (found >= _LEAST) & (found >= _SHARE * pairs)
+    at = (found >= _LEAST) & (found >= _SHARE * pairs)
+    through = np.isin(np.arange(n), np.append(i[askew], j[askew])[np.tile(past == 2, 2)])
+    return Meetings(at, float(through.sum() / max(at.sum(), 1)))
 
 
 def _linked(i, j, nearest, alike, sure):
@@ -58,27 +80,24 @@ def _linked(i, j, nearest, alike, sure):
 
 
 def _goes_past(i, j, surface):
-    """Whether the sheet of either sample has samples well on both sides of the other's tangent plane."""
+    """Of how many of two samples, 0 to 2, the sheet has samples well on both sides of the other's tangent plane."""
     n = len(surface.points)
     pair, number = numbered(np.minimum(i, j) * n + np.maximum(i, j))
-    ends, past = np.stack(np.divmod(pair, n)), np.zeros(len(pair), bool)
+    ends, past = np.stack(np.divmod(pair, n)), np.zeros(len(pair), np.int8)
     every, row = numbered(ends)
     wide, member = _members(surface, every, _WIDER, Progress())
     member = (member > _STRAIGHT) & (surface.confidence[wide] >= _LINKED)
     points, normals = surface.columns.points, surface.normals.T
 
     def look(part):
-        left = np.arange(len(pair))[part]
         for one, other in ((0, 1), (1, 0)):
-            at, on = row[one, left], ends[other, left]
+            at, on = row[one, part], ends[other, part]
             near, known = wide[at], member[at]
             away = [x.take(near) - x.take(on)[:, None] for x in points]
             height = dots(away, [axis.take(on)[:, None] for axis in normals])
-            limit = _PAST * surface.spacing[ends[one, left]]
+            limit = _PAST * surface.spacing[ends[one, part]]
             above = np.where(known, height, -np.inf).max(axis=1) > limit
-            found = above & (np.where(known, height, np.inf).min(axis=1) < -limit)
-            past[left[found]] = True
-            left = left[~found]
+            past[part] += above & (np.where(known, height, np.inf).min(axis=1) < -limit)
 
     over_rows(look, len(pair), _CHUNK)
     return past[number]

@@ -113,4 +113,6 @@ def edge_table(faces: np.ndarray, n: int) -> csr_matrix:
 def looked_up(table: csr_matrix, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
     """What a table of edges holds for those between vertices `tail` and `head`, of one shape; 0 where it has none."""
     low, high = np.minimum(tail, head).reshape(-1), np.maximum(tail, head).reshape(-1)
+    if not len(low):  # of nothing SciPy gives another sparse array
+        return np.zeros(tail.shape, table.dtype)
     return np.asarray(table[low, high]).reshape(tail.shape)

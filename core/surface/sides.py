@@ -97,11 +97,9 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     outside on both sides of most samples every crossing has one side at both ends.
     """
     progress = Progress.of(progress)
-    limit = _far(surface, grid) * grid.spacing
-    near = each(lambda u, inner: inner & (u <= np.float32(limit)), values, inner_nodes(values))
-    labels, count = regions(each(np.logical_not, near))
-    outside = int(at_nodes(labels, np.array([0]))[0])
-    if (regions_beside(labels, surface, limit, grid) == outside).all(axis=1).mean() > _OUTSIDE:
+    near, labels, count = _far_regions(values, surface, grid)
+    outside = _outside(labels)
+    if _is_open(labels, surface, grid):
         inside = each(np.zeros_like, near)
         low, axis = np.divmod(crossings.changing_sides, 3)
         return _judged(inside, low, low + node_strides(grid.shape)[axis], np.ones(len(low), bool), grid)
@@ -116,6 +114,29 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster))
     progress(0.9)
     return _judged(inside, a, b, crossed, grid)
+
+
+def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
+    """Whether any sides are told by :func:`find_sides`, from the same distances: not where the outside lies on both
+    sides of most samples."""
+    return not _is_open(_far_regions(values, surface, grid)[1], surface, grid)
+
+
+def _far_regions(values, surface, grid):
+    """Which nodes are near the surface and off the sides of the box, the regions of the others, and their number."""
+    limit = np.float32(_far(surface, grid) * grid.spacing)
+    near = each(lambda u, inner: inner & (u <= limit), values, inner_nodes(values))
+    return near, *regions(each(np.logical_not, near))
+
+
+def _outside(labels):
+    """The region at the box."""
+    return int(at_nodes(labels, np.array([0]))[0])
+
+
+def _is_open(labels, surface, grid):
+    seen = regions_beside(labels, surface, _far(surface, grid) * grid.spacing, grid)
+    return (seen == _outside(labels)).all(axis=1).mean() > _OUTSIDE
 
 
 def regions_beside(labels, surface: LocalSurface, level: float, grid: Grid) -> np.ndarray:

@@ -23,27 +23,57 @@ _MENDED = 2  # times, since holes may show where scraps are gone
 def single_layer(
     values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
 ) -> tuple[Mesh, int]:
-    """The surface as one sheet: the boundary of the inside, where that is the whole surface; where it has two sides,
-    what lies between them (see :func:`open_sheet`); else :func:`dual_contour`.
+    """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
+    progress = Progress.of(progress)
+    sheet = sheet_of_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.5))
+    if sheet is not None:
+        return sheet, 0
+    return sheet_of_crossings(values, band, crossings, surface, grid, progress.part(0.5, 1.0))
 
-    Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
-    either side, and may have handles there. A closed one is left so; of an open one the dual contour shows the line,
-    and is taken if it can be wound alike wherever it has two faces.
+
+def sheet_of_sides(
+    values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
+) -> Mesh | None:
+    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface;
+    else what lies between the two sides (see :func:`open_sheet`). None where it is one-sided or sheets meet.
 
     values : (nx,ny,nz) float32 or Blocks, unsigned distances     band : the nodes near the surface
-    Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress = Progress.of(progress)
     if sides.complete:
-        return signed_mesh(sides.sign(values), surface, grid, progress), 0
-    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.1))
-    by_crossings = signed is None or crossings.normal.any()
-    if by_crossings:
-        contour = dual_contour(crossings, surface, grid, progress.part(0.1, 0.5))
-        sheet, unoriented = orient(mended(contour, surface, grid.spacing))
-    if not by_crossings or (signed is not None and unoriented):
-        contour = open_sheet(signed, band, surface, grid, progress.part(0.5, 0.9))
-        sheet, unoriented = orient(mended(contour, surface, grid.spacing))
+        return signed_mesh(sides.sign(values), surface, grid, progress)
+    if crossings.normal.any():
+        return None
+    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.2))
+    if signed is None:
+        return None
+    sheet, unoriented = _finished(open_sheet(signed, band, surface, grid, progress.part(0.2, 0.9)), surface, grid)
+    return None if unoriented or (sheet.edge_counts()[1] > 2).any() else sheet
+
+
+def sheet_of_crossings(
+    values, band: NearBand, crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None
+) -> tuple[Mesh, int]:
+    """Any surface as one sheet by :func:`dual_contour`, with edges of several faces where sheets meet.
+
+    Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
+    either side, and may have handles there; so it is taken only if the dual contour, which shows the line, cannot be
+    wound alike wherever it has two faces.
+
+    Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
+    """
+    progress = Progress.of(progress)
+    sheet, unoriented = _finished(dual_contour(crossings, surface, grid, progress.part(0.0, 0.5)), surface, grid)
+    if unoriented and crossings.normal.any():
+        signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
+        if signed is not None:
+            return _finished(open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9)), surface, grid)
+    return sheet, unoriented
+
+
+def _finished(mesh, surface, grid):
+    """A sheet mended and wound alike, and the number of edges where that fails."""
+    sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
     return centred(sheet), unoriented
 
 

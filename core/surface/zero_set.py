@@ -51,12 +51,14 @@ def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress
     for turn, outward in enumerate((1.0, -1.0)):
         part = progress.part(turn / 2, (turn + 1) / 2)
         normal, least = vertex_normals(vertices, mesh.faces)
-        bent, side = np.flatnonzero(least < FLAT), np.zeros_like(vertices)
-        way = outward * normal[bent]
-        found = surface.project(vertices[bent] + _ASIDE * cell * way, part.part(0.0, 0.5))
+        beside_bends, side = np.zeros(len(vertices), bool), np.zeros_like(vertices)
+        beside_bends[mesh.faces[(least < FLAT)[mesh.faces].any(axis=1)]] = True
+        row = np.flatnonzero(beside_bends)
+        way = outward * normal[row]
+        found = surface.project(vertices[row] + _ASIDE * cell * way, part.part(0.0, 0.5))
         direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
         clear = back & (row_dots(direction, way) > 0) & ~found.past_rim
-        side[bent[clear]] = direction[clear]
+        side[row[clear]] = direction[clear]
         known = side.any(axis=1)
         beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
         vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), _INTO)

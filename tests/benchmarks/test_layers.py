@@ -47,15 +47,18 @@ def test_a_double_cover_is_compared_with_faces_astride(tmp_path):
     np.savez(path, **arrays)
     row = layers_of(path, "uniform")
     assert row["crossed"] < 0.02 < 0.2 < row["crossed_astride"]
-    assert not row["dense"]
     assert row["cd"] != row["cd_astride"]
 
 
 def test_the_page_shows_every_row(tmp_path):
     row = {"case": "ball", "sampling": "uniform", "crossed": 0.05, "gap": [0.0] * len(PERCENTILES)}
-    row |= {"crossed_astride": 0.5, "cd": 0.2, "cd_astride": 0.1, "dense": False}
-    assert "| ball | uniform | 5.00% |" in write_page([row], tmp_path).read_text()
-    assert json.loads((tmp_path / "layers" / "numbers.json").read_text())["rows"] == [row]
+    row |= {"crossed_astride": 0.5, "cd": 0.2, "cd_astride": 0.1}
+    sides = row | {"case": "sheet", "crossed_astride": None, "cd_astride": None}
+    page = write_page([row, sides], tmp_path).read_text()
+    assert "| ball | uniform | 5.00% |" in page
+    assert "| 50.0% | 0.200 | 0.100 | 2.00 |" in page
+    assert "| – | 0.200 | – | – |" in page
+    assert json.loads((tmp_path / "layers" / "numbers.json").read_text())["rows"] == [row, sides]
 
 
 def test_a_folder_without_cases_is_said(tmp_path):

@@ -36,6 +36,28 @@ def test_faces_are_wound_alike_and_use_every_vertex(run, request):
     np.testing.assert_array_equal(np.unique(surface.faces), np.arange(len(surface.vertices)))
 
 
+@pytest.mark.usefixtures("at_offset")
+@pytest.mark.parametrize(
+    ("points", "true", "pieces"),
+    [
+        (shapes.torus(2000), shapes.torus_distance, [0, 0]),
+        (shapes.disc(800), shapes.disc_distance, [2]),
+        (shapes.hemisphere(1500), shapes.hemisphere_distance, [2]),
+    ],
+    ids=["torus", "disc", "hemisphere"],
+)
+def test_extracted_at_an_offset_it_is_as_closed_and_as_close(points, true, pieces):
+    """Which is how it is made of sheets that meet."""
+    run = reconstruct(points, Settings(resolution=48))
+    directed = run.surface.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    assert len(np.unique(directed, axis=0)) == len(directed)
+    assert set(run.surface.edge_counts()[1]) == {2}
+    assert [shapes.euler(piece) for piece in shapes.components(run.surface)] == pieces
+    off = true(run.surface.vertices) / run.report["spacing"]
+    assert np.percentile(off, 85) < 0.02
+    assert off.max() < 0.6
+
+
 @pytest.mark.parametrize(
     ("run", "true", "hair"),
     [
@@ -118,6 +140,7 @@ def test_parallel_sheets_stay_two(gap):
     np.testing.assert_allclose(heights, [-gap * cell / 2, gap * cell / 2], atol=0.02 * cell)
 
 
+@pytest.mark.usefixtures("at_offset")
 @pytest.mark.parametrize("offset", [0.5, 1.0, 2.0, 4.0])
 def test_the_offset_does_not_show_in_the_result(offset):
     run = reconstruct(shapes.sphere(800), Settings(resolution=48, offset=offset))
@@ -162,6 +185,7 @@ def test_few_samples_leave_no_holes(count, band):
     assert set(surface.edge_counts()[1]) == {2}
 
 
+@pytest.mark.usefixtures("at_offset")
 def test_at_the_least_offset_a_sheet_midway_between_nodes_is_covered():
     rng = np.random.default_rng(0)
     flat = rng.uniform(size=(4000, 3)) * [1, 1, 0]

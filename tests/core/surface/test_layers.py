@@ -93,6 +93,7 @@ def crossed(run):
     return ((behind < 0) * mesh.face_areas()).sum() / mesh.face_areas().sum()
 
 
+@pytest.mark.usefixtures("at_offset")
 @pytest.mark.parametrize("points", [shapes.torus(3000), shapes.disc(1500), shapes.junction(3000)], ids=len)
 def test_layers_of_a_double_cover_hardly_cross(points):
     assert crossed(reconstruct(points, Settings(resolution=48))) < 0.015

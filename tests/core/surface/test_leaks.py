@@ -239,6 +239,7 @@ def _block_of(node):
     return np.ravel_multi_index(tuple(at), table_shape(GRID.shape))
 
 
+@pytest.mark.usefixtures("at_offset")
 @pytest.mark.parametrize("seed", range(4))
 def test_runs_give_closed_covers_of_cubes_of_random_points(seed):
     """Without this each of the last three has from two to four tunnels."""
@@ -250,6 +251,7 @@ def test_runs_give_closed_covers_of_cubes_of_random_points(seed):
     assert shapes.euler(cover) == 4
 
 
+@pytest.mark.usefixtures("at_offset")
 def test_a_run_spans_what_it_shuts_smoothly_and_leaves_wide_openings():
     """Folded onto its rim the opening would be .024 off."""
     points = shapes.scattered_sphere(600, seed=1)

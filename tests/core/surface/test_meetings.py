@@ -6,7 +6,7 @@ import pytest
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.meeting_edges import _least
-from core.surface.meetings import _goes_past, _linked, meetings
+from core.surface.meetings import _goes_past, _linked, find_meetings
 from core.surface.sheets import sheets_near
 from tests import shapes
 
@@ -20,6 +20,16 @@ def crossed():
     flat = shapes.square(1200)
     normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
     return fitted(np.concatenate([flat, flat[:, [2, 1, 0]] + np.array([0, 0, 1e-3])]), normals)
+
+
+def ended(turned):
+    """A floor, z = 0, and a wall, x = 0, that ends on it."""
+    flat = shapes.square(1200)
+    wall = flat[:, [2, 1, 0]] + np.array([0, 0, 1.02])
+    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
+    if turned:
+        return fitted(np.concatenate([wall, flat]), normals[::-1])
+    return fitted(np.concatenate([flat, wall]), normals)
 
 
 def cube():
@@ -41,7 +51,7 @@ def test_one_sheet_meets_none(name):
         points = shapes.torus(2000)
         ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
         surface = fitted(points, (points - ring) / 0.4)
-    assert not meetings(surface).any()
+    assert not find_meetings(surface).at.any()
 
 
 def test_samples_are_linked_by_one_that_is_alike_to_both():
@@ -60,30 +70,30 @@ def test_samples_are_linked_by_one_that_is_alike_to_both():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_sheet_goes_past_another_where_it_has_samples_on_both_sides(turned):
-    """A floor and a wall that ends on it, in either order: one of two is enough."""
-    flat = shapes.square(1200)
-    wall = flat[:, [2, 1, 0]] + np.array([0, 0, 1.02])
-    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
-    surface = fitted(np.concatenate([flat, wall]), normals)
-    if turned:
-        surface = fitted(np.concatenate([wall, flat]), normals[::-1])
+    """A floor goes past a wall that ends on it, and the wall not past the floor, in either order."""
+    surface = ended(turned)
     middle = np.hypot(surface.points[:, 0], surface.points[:, 2]) < 2 * np.median(surface.spacing)
     near = np.flatnonzero(middle & (np.abs(surface.points[:, 1]) < 0.6))
     i, j = (each.reshape(-1) for each in np.meshgrid(near, near))
     close = np.linalg.norm(surface.points[i] - surface.points[j], axis=1) < 2 * np.median(surface.spacing)
     same = surface.normals[i, 2] == surface.normals[j, 2]
     found = _goes_past(i, j, surface)
-    assert found[~same & close].mean() > 0.9
+    assert (found[~same & close] == 1).mean() > 0.9
     assert not found[same].any()
+    meet = find_meetings(surface)
+    assert meet.at.sum() > 50
+    assert meet.through < 0.05
 
 
 def test_crossing_squares_meet_along_their_line_only():
     surface = crossed()
     away = np.hypot(surface.points[:, 0], surface.points[:, 2]) / np.median(surface.spacing)
-    found = meetings(surface)
+    meet = find_meetings(surface)
+    found = meet.at
     inside = np.abs(surface.points[:, 1]) < 0.8
     assert found[(away < 1) & inside].all()
     assert not found[away > 9].any()
+    assert meet.through > 0.25
 
 
 def test_sheets_side_by_side_meet():
@@ -92,7 +102,9 @@ def test_sheets_side_by_side_meet():
     surface = fitted(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
     assert 0.8 * np.median(surface.spacing) > 0.04
     inner = (np.abs(points[:, :2]) < 0.8).all(axis=1)
-    assert meetings(surface)[inner].mean() > 0.95
+    meet = find_meetings(surface)
+    assert meet.at[inner].mean() > 0.95
+    assert meet.through == 0
 
 
 def test_a_node_near_a_crossing_knows_both_sheets():

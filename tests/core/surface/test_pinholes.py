@@ -146,6 +146,7 @@ def pierced(seed, radius):
     return points[from_holes(points) > radius * np.median(local_spacing(points))]
 
 
+@pytest.mark.usefixtures("at_offset")
 @pytest.mark.parametrize("band", [None, 3.0])
 @pytest.mark.parametrize(("seed", "off"), [(0, 0.001), (3, 0.004)])
 def test_runs_span_pinholes_smoothly_and_leave_wide_holes(seed, off, band):
@@ -158,6 +159,7 @@ def test_runs_span_pinholes_smoothly_and_leave_wide_holes(seed, off, band):
     assert shapes.euler(reconstruct(pierced(seed, 4.0), Settings(resolution=64, band=band)).surface) == -4
 
 
+@pytest.mark.usefixtures("at_offset")
 def test_once_they_are_filled_only_new_vertices_look_for_the_surface_again(monkeypatch):
     asked, look = [], double_cover.first_steps
     monkeypatch.setattr(double_cover, "first_steps", lambda x, *rest: asked.append(len(x)) or look(x, *rest))

@@ -121,6 +121,7 @@ def test_blocks_take_the_same_values():
     np.testing.assert_array_equal(blocks.dense(), values)
 
 
+@pytest.mark.usefixtures("at_offset")
 @pytest.mark.parametrize("gap", [2.4, 2.7])
 def test_spheres_in_each_other_stay_two(gap):
     """Little more than two levels apart: each has an outer and an inner layer."""

@@ -7,27 +7,27 @@ from core import Settings, reconstruct
 from core.field.blocks import Blocks
 from core.linalg import symmetric
 from core.progress import Progress
-from core.surface import single_layer
+from core.surface import extract
+from core.surface.single_layer import sheet_of_sides
 from core.surface.two_sides import _orientations, two_sided
 from tests import shapes
 
 
 @pytest.fixture
 def asked(monkeypatch):
-    """A function of points and settings: what `two_sided` is given in a run, and what it answers."""
+    """A function of points and settings: what `two_sided` is given, or would be, in a run, and what it answers."""
 
     def ask(points, **settings):
         seen = {}
 
-        def look(*given):
-            seen.update(zip(("values", "band", "crossings", "surface", "grid"), given, strict=False))
-            signed = two_sided(*given)
+        def look(values, band, crossings, sides, *rest):
+            given = values, band, crossings, *rest[:2]
+            seen.update(zip(("values", "band", "crossings", "surface", "grid"), given, strict=True))
+            signed = two_sided(*given, Progress())
             seen["signed"] = signed.dense() if isinstance(signed, Blocks) else signed
-            if isinstance(signed, np.ndarray):
-                seen["signed"] = signed.copy()
-            return signed
+            return sheet_of_sides(values, band, crossings, sides, *rest)
 
-        monkeypatch.setattr(single_layer, "two_sided", look)
+        monkeypatch.setattr(extract, "sheet_of_sides", look)
         reconstruct(points, Settings(**{"resolution": 48, "surface": "single", "denoise": 0, **settings}))
         return seen
 

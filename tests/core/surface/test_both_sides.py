@@ -1,0 +1,117 @@
+"""Both sides of a sheet as one closed mesh."""
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from core import InputError, Mesh, Settings, both_sides, reconstruct
+from core.surface.layers import HAIR
+from tests import shapes
+
+CELL = 0.1
+
+
+def strip(rows, columns):
+    """A flat grid of quads, as pairs of triangles."""
+    x, y = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
+    vertices = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3).astype(float)
+    at = np.arange(len(vertices)).reshape(rows + 1, columns + 1)
+    a, b, c, d = (part.reshape(-1) for part in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh(vertices, faces.astype(np.int32), rows * columns)
+
+
+def is_closed_manifold(mesh):
+    """Two faces at each edge, one each way, and one fan of faces around each vertex, all of them in use."""
+    directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    fans = 0
+    for vertex in range(len(mesh.vertices)):
+        around = np.stack([np.roll(face, -list(face).index(vertex))[1:] for face in mesh.faces if vertex in face])
+        ends, number = np.unique(around, return_inverse=True)
+        graph = coo_matrix((np.ones(len(around)), tuple(number.reshape(-1, 2).T)), shape=(len(ends),) * 2)
+        fans += connected_components(graph)[0]
+    both_ways = len(np.unique(directed, axis=0)) == len(directed)
+    return both_ways and set(mesh.edge_counts()[1]) == {2} and fans == len(mesh.vertices)
+
+
+def touching():
+    """Two triangles with a vertex in common, wound alike."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0.0]])
+    return Mesh(vertices, np.array([[0, 1, 2], [0, 3, 4]], np.int32))
+
+
+def octahedron():
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    upper = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]]
+    return Mesh(corners, np.array([*upper, *([b, a, 5] for a, b, _ in upper)], np.int32))
+
+
+SHEETS = {  # and how many pieces their covers have, of which Euler characteristic each
+    "triangle": (Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32)), [2]),
+    "two triangles": (strip(1, 1), [2]),
+    "a strip of one quad's width": (strip(4, 1), [2]),
+    "a patch": (strip(3, 4), [2]),
+    "triangles that touch": (touching(), [2, 2]),
+    "a patch with a hole": (strip(3, 3).of_faces(~np.isin(np.arange(18), [4, 13])), [0]),
+    "a closed one": (octahedron(), [2, 2]),
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_covers_any_sheet_with_two_sides(name):
+    sheet, euler = SHEETS[name]
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    assert [shapes.euler(piece) for piece in shapes.components(cover)] == euler
+    np.testing.assert_allclose(cover.face_areas().sum(), 2 * sheet.face_areas().sum(), rtol=1e-3)
+
+
+def test_layers_are_a_hair_apart_and_meet_at_the_border():
+    """Each faces away from the sheet, and the quads of the sheet are there twice."""
+    sheet = strip(5, 4)
+    cover = both_sides(sheet, CELL)
+    assert (sheet.pairs, cover.pairs) == (20, 40)
+    for half in (cover.faces[:40], cover.faces[40:80]):
+        a, b, c = (cover.vertices[half[:, k]] for k in range(3))
+        up = np.cross(b - a, c - a)[:, 2]
+        np.testing.assert_allclose(np.sort(up), np.repeat([-1.0, 1.0], 20), rtol=1e-3)
+    np.testing.assert_array_equal(cover.quads[:, [0, 1, 2]], cover.faces[:40])
+    inside = (cover.vertices[:, :2] > 0).all(axis=1) & (cover.vertices[:, :2] < [5, 4]).all(axis=1)
+    assert inside.sum() == 2 * 4 * 3
+    np.testing.assert_allclose(np.abs(cover.vertices[inside, 2]), 0.5 * HAIR * CELL)
+    np.testing.assert_array_equal(cover.vertices[~inside, 2], 0)
+
+
+def test_the_outer_layer_of_a_closed_sheet_faces_out():
+    volumes = sorted(shapes.signed_volume(piece) for piece in shapes.components(both_sides(octahedron(), CELL)))
+    np.testing.assert_allclose(volumes, [-4 / 3, 4 / 3], rtol=1e-3)
+    assert -volumes[0] < 4 / 3 < volumes[1]
+
+
+@pytest.mark.parametrize("third", [[0, 1, 4], [0, 3, 1]], ids=["unlike", "three"])
+def test_a_sheet_without_two_sides_is_refused(third):
+    """One edge has two faces that are wound unlike, or three."""
+    faces = [[0, 1, 2], third] if third == [0, 1, 4] else [[0, 1, 2], third, [1, 0, 4]]
+    with pytest.raises(InputError, match="1 edges of the sheet have more than two faces, or two wound unlike"):
+        both_sides(Mesh(np.random.default_rng(0).random((5, 3)), np.array(faces, np.int32)), CELL)
+
+
+@pytest.mark.parametrize(
+    ("points", "same"),
+    [
+        (shapes.torus(2000), True),
+        (shapes.disc(800), True),
+        (shapes.junction(2400), False),
+        (shapes.moebius(1500), False),
+        (shapes.scattered_sphere(150), False),
+        (shapes.sphere(20_000), False),
+    ],
+    ids=["torus", "disc", "junction", "moebius", "sparse", "dense"],
+)
+def test_a_run_covers_the_single_layer_where_that_has_two_sides(points, same):
+    """And is neither sparse nor dense; then every vertex of the cover lies within half a hair of one of the sheet."""
+    run = reconstruct(points, Settings(resolution=48, surface="both"))
+    apart = KDTree(run.sheet.vertices).query(run.surface.vertices)[0] / run.field.spacing
+    assert (apart.max() <= 0.5 * HAIR + 1e-9) == same
