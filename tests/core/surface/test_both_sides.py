@@ -48,6 +48,16 @@ def octahedron():
     return Mesh(corners, np.array([*upper, *([b, a, 5] for a, b, _ in upper)], np.int32))
 
 
+def slab(count, thickness=0.16):
+    """Random points on a closed box with two walls close to each other."""
+    random = np.random.default_rng(0)
+    size = np.array([2, 2, thickness])
+    points, axis = random.uniform(-0.5, 0.5, (count, 3)) * size, np.arange(count) % 8
+    axis = np.where(axis < 7, 2, np.arange(count) // 8 % 2)
+    points[np.arange(count), axis] = random.choice([-0.5, 0.5], count) * size[axis]
+    return points
+
+
 SHEETS = {  # and how many pieces their covers have, of which Euler characteristic each
     "triangle": (Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32)), [2]),
     "two triangles": (strip(1, 1), [2]),
@@ -107,8 +117,10 @@ def test_a_sheet_without_two_sides_is_refused(third):
         (shapes.moebius(1500), False),
         (shapes.scattered_sphere(150), False),
         (shapes.sphere(20_000), False),
+        (slab(1500), True),
+        (np.concatenate([shapes.sphere(1500), shapes.sphere(1500) + [0.8, 0, 0]]), False),
     ],
-    ids=["torus", "disc", "junction", "moebius", "sparse", "dense"],
+    ids=["torus", "disc", "junction", "moebius", "sparse", "dense", "close walls", "crossed"],
 )
 def test_a_run_covers_the_single_layer_where_that_has_two_sides(points, same):
     """And is neither sparse nor dense; then every vertex of the cover lies within half a hair of one of the sheet."""
