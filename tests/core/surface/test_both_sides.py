@@ -118,7 +118,7 @@ def test_a_sheet_without_two_sides_is_refused(third):
         (shapes.scattered_sphere(150), False),
         (shapes.sphere(20_000), False),
         (slab(1500), True),
-        (np.concatenate([shapes.sphere(1500), shapes.sphere(1500) + [0.8, 0, 0]]), False),
+        (np.concatenate([shapes.sphere(1500), shapes.sphere(1500) + np.array([0.8, 0, 0])]), False),
     ],
     ids=["torus", "disc", "junction", "moebius", "sparse", "dense", "close walls", "crossed"],
 )
