@@ -7,6 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from core import InputError, Mesh, Settings, both_sides, reconstruct
+from core.surface import extract
 from core.surface.layers import HAIR
 from tests import shapes
 
@@ -58,6 +59,13 @@ def slab(count, thickness=0.16):
     return points
 
 
+def figure_eight(count):
+    """Random points on a ring whose section is an eight: closed, and passing through itself."""
+    turn, angle = np.random.default_rng(0).uniform(0, 2 * np.pi, (2, count))
+    radius = 1.2 + 0.6 * np.sin(turn)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.3 * np.sin(2 * turn)], axis=1)
+
+
 SHEETS = {  # and how many pieces their covers have, of which Euler characteristic each
     "triangle": (Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32)), [2]),
     "two triangles": (strip(1, 1), [2]),
@@ -87,7 +95,9 @@ def test_layers_are_a_hair_apart_and_meet_at_the_border():
         a, b, c = (cover.vertices[half[:, k]] for k in range(3))
         up = np.cross(b - a, c - a)[:, 2]
         np.testing.assert_allclose(np.sort(up), np.repeat([-1.0, 1.0], 20), rtol=1e-3)
-    np.testing.assert_array_equal(cover.quads[:, [0, 1, 2]], cover.faces[:40])
+    ends = cover.vertices[np.sort(cover.quads, axis=1)]
+    np.testing.assert_allclose(np.ptp(ends[..., :2], axis=1), 1)  # four corners of a unit square
+    np.testing.assert_allclose(np.ptp(ends[..., :2].sum(axis=2), axis=1), 2)
     inside = (cover.vertices[:, :2] > 0).all(axis=1) & (cover.vertices[:, :2] < [5, 4]).all(axis=1)
     assert inside.sum() == 2 * 4 * 3
     np.testing.assert_allclose(np.abs(cover.vertices[inside, 2]), 0.5 * HAIR * CELL)
@@ -118,12 +128,23 @@ def test_a_sheet_without_two_sides_is_refused(third):
         (shapes.scattered_sphere(150), False),
         (shapes.sphere(20_000), False),
         (slab(1500), True),
-        (np.concatenate([shapes.sphere(1500), shapes.sphere(1500) + np.array([0.8, 0, 0])]), False),
+        (figure_eight(3000), False),
     ],
     ids=["torus", "disc", "junction", "moebius", "sparse", "dense", "close walls", "crossed"],
 )
 def test_a_run_covers_the_single_layer_where_that_has_two_sides(points, same):
-    """And is neither sparse nor dense; then every vertex of the cover lies within half a hair of one of the sheet."""
+    """And is neither sparse nor dense, and does not pass through itself."""
     run = reconstruct(points, Settings(resolution=48, surface="both"))
+    assert is_of_sheet(run) == same
+
+
+def test_a_run_leaves_a_torn_sheet_alone(monkeypatch):
+    """As if samples were far off it."""
+    monkeypatch.setattr(extract, "_TORN", -1.0)
+    assert not is_of_sheet(reconstruct(shapes.disc(800), Settings(resolution=48, surface="both")))
+
+
+def is_of_sheet(run):
+    """Whether all vertices of the double cover lie within half a hair of those of the single layer."""
     apart = KDTree(run.sheet.vertices).query(run.surface.vertices)[0] / run.field.spacing
-    assert (apart.max() <= 0.5 * HAIR + 1e-9) == same
+    return apart.max() <= 0.5 * HAIR + 1e-9
