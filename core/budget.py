@@ -23,7 +23,7 @@ _MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 45.0, "node": 31e-6, "mes
 _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
 _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
-_MESHES = {"none": 0.0, "double": 3.0e-3, "single": 3.6e-3, "both": 6e-3, "signed": 3.6e-3}
+_MESHES = {"none": 0.0, "double": 3.0e-3, "single": 3.6e-3, "both": 5e-3, "signed": 3.6e-3}
 
 # The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, without a mesh or with.
 _BAND_MEMORY = {"field": 60.0, "field alone": 3.2e-3, "meshes": 3.6e-3}  # MiB

@@ -11,8 +11,8 @@ from ..core import pipeline
 from ..core.cleaning.clean import clean
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
+from ..core.field.integration import near_band
 from ..core.field.local_surface import fit_local_surface
-from ..core.field.steps import NearBand
 from ..core.io.report import report_json
 from ..core.io.vdb import write_vdb
 from ..core.normals.estimate import checked_constraints, estimate_normals
@@ -236,10 +236,10 @@ def _extracted(task, folder, progress):
     normals, confidence = known_normals(task.known, len(task.points), samples.source_index)
     grid, spacing = fit_grid(samples.points, settings.resolution), local_spacing(samples.points)
     values = stored_field.distances(task.volume, grid.shape) / np.float32(samples.scale)
-    part = progress.part(0.0, 0.4, "surface")
+    part = progress.part(0.0, 0.2, "surface")
     local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)
-    no_steps = NearBand.without_nodes(grid.shape)  # volumes hold distances alone
-    found = extract_surfaces(values, no_steps, local, grid, settings, lambda x: x, progress.part(0.4, 0.9))
+    band = near_band(local, grid, progress.part(0.2, 0.5, "surface"))  # of which volumes hold the distances alone
+    found = extract_surfaces(values, band, local, grid, settings, lambda x: x, progress.part(0.5, 0.9))
     skin = None
     if mesh := found.meshes.get("double"):
         off = np.linalg.norm(local.project(mesh.vertices, progress.part(0.9, 1.0)).step, axis=1) * samples.scale

@@ -111,7 +111,7 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
 
 class VAD_OT_reextract(run.Run, bpy.types.Operator):
     """Make field and meshes of the last run anew with other settings, from the normals it found. The closed mesh alone
-    is made from the field as it is, in no time, as long as resolution, band and bridge stay"""
+    is made from the field as it is, in less time, as long as resolution, band and bridge stay"""
 
     bl_idname = "vad.reextract"
     bl_label = "Extract Again"
@@ -133,7 +133,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
 
     def instant(self, task):
         if task.volume is not None:
-            return len(task.points) <= 50_000 and task.settings.resolution <= 128
+            return len(task.points) <= 20_000 and task.settings.resolution <= 128
         return len(task.points) <= 20_000 and task.settings.resolution <= 64
 
     def prepare(self, context):

@@ -40,10 +40,7 @@ def distance_field(
     with directions by `diffusion`: "kernel" or "grid". Raises :class:`SettingsError` for other words."""
     Settings(integration=integration, diffusion=diffusion)
     progress = Progress.of(progress)
-    node = near_nodes(surface, grid, BAND, progress.part(0.0, 0.05))
-    near = surface.project(grid.positions(node), progress.part(0.05, 0.6), FROM_NODES)
-    inside = near.distance <= BAND * grid.spacing
-    node, near = node[inside], near[inside]
+    node, near = _projected(surface, grid, progress.part(0.0, 0.6))
     if integration == "poisson":
         known = np.full(grid.shape, np.nan)
         known.flat[node] = near.distance
@@ -54,6 +51,20 @@ def distance_field(
         values = _transport(grid, held, feet, progress.part(0.8, 1.0))
         values.flat[node] = no_farther_than_feet(near.distance, values.flat[node], grid)
     return values, NearBand(grid.shape, node, near.step, near.past_rim, near.sample)
+
+
+def near_band(surface: LocalSurface, grid: Grid, progress=None) -> NearBand:
+    """The band of :func:`distance_field` alone: the nodes within two cells of the surface."""
+    node, near = _projected(surface, grid, Progress.of(progress))
+    return NearBand(grid.shape, node, near.step, near.past_rim, near.sample)
+
+
+def _projected(surface, grid, progress):
+    """Flat indices of the nodes within the band, and where they fall on the surface."""
+    node = near_nodes(surface, grid, BAND, progress.part(0.0, 0.1))
+    near = surface.project(grid.positions(node), progress.part(0.1, 1.0), FROM_NODES)
+    inside = near.distance <= BAND * grid.spacing
+    return node[inside], near[inside]
 
 
 def _transport(grid, node, feet, progress):

@@ -28,11 +28,6 @@ class NearBand:
     past_rim: np.ndarray
     sample: np.ndarray
 
-    @classmethod
-    def without_nodes(cls, shape: tuple[int, int, int]) -> "NearBand":
-        """That of a grid of which no steps are known."""
-        return cls(shape, np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, bool), np.empty(0, np.int32))
-
     @cached_property
     def ahead(self) -> np.ndarray:
         """(3,b+1) int64: the row of the next node along each axis, -1 where that is not in the band or past the side of

@@ -10,7 +10,6 @@ from core.field.grid import CORNERS, fit_grid
 from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
 from core.field.narrow_band import banded_field
-from core.field.steps import NearBand
 from core.points import local_spacing
 from tests import shapes
 from tests.bands import near_band
@@ -145,7 +144,6 @@ def test_positions_away_from_the_band_are_left_out():
     row, _ = distances(band(onto_plane((0, 0, 1), 5.0)), positions())
     assert len(row)
     assert (np.abs(positions()[row, 2] - 5.0) < 3).all()
-    assert not len(distances(NearBand.without_nodes(SHAPE), positions())[0])
 
 
 def test_steps_lead_to_the_foot_points_and_those_past_rims_can_be_left_out():
