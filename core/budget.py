@@ -25,8 +25,8 @@ _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
 _MESHES = {"none": 0.0, "double": 3.0e-3, "single": 3.6e-3, "both": 5e-3, "signed": 3.6e-3}
 
-# The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, without a mesh or with.
-_BAND_MEMORY = {"field": 60.0, "field alone": 3.2e-3, "meshes": 3.6e-3}  # MiB
+# The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
+_BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
 # Processor seconds where the probe takes _PROBE of them; fitted to 41 runs over 500 to 20,000 samples at resolutions of
@@ -115,7 +115,7 @@ def _memory(samples, area, nodes, settings):
     least, each = _by_samples(settings)
     diagram, by_cores = least + each * samples, _CORE * max(0, cores() - 2)
     if settings.band is not None:
-        kind = "field alone" if settings.surface == "none" else "meshes"
+        kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
         return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
     node = _POISSON_NODE if settings.integration == "poisson" else _MEMORY["node"]
     field = _MEMORY["field"] + node * nodes
