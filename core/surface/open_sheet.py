@@ -17,7 +17,7 @@ from .pieces import pieces_with_samples
 from .settling import settled
 from .thin_parts import find_thin_parts
 from .triangles import mesh_of
-from .zero_set import sharpened, zero_set
+from .zero_set import zero_set
 
 _NEAR = 1.0  # cells, distance of the node next to a vertex; farther ones are where the distances end
 _COVERED = 0.4  # cells, a face whose middle is this close to the surface is on it, a farther one past its rim
@@ -35,9 +35,9 @@ def open_sheet(values: np.ndarray | Blocks, band: NearBand, surface: LocalSurfac
     vertices, faces = zero_set(values, thin, surface, grid, progress.part(0.1, 0.2), _NEAR * cell)
     vertices, faces = _trimmed(vertices, faces, band, surface, grid, progress.part(0.2, 0.4))
     vertices = evened(vertices, faces)
-    step = surface.project(vertices, progress.part(0.4, 0.7)).step
-    mesh = mesh_of(settled(vertices, step, surface, cell, progress.part(0.7, 0.8)), faces)
-    return pieces_with_samples(sharpened(mesh, surface, cell, progress.part(0.8, 1.0)), surface.tree, cell)
+    step = surface.project(vertices, progress.part(0.4, 0.8)).step
+    mesh = mesh_of(settled(vertices, step, surface, cell, progress.part(0.8, 1.0)), faces)
+    return pieces_with_samples(mesh, surface.tree, cell)
 
 
 def _trimmed(vertices, faces, band, surface, grid, progress):

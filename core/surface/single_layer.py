@@ -8,6 +8,7 @@ from .centring import centred
 from .crossings import Crossings
 from .dual_contour import dual_contour
 from .holes import fill_pinholes
+from .junctions import onto_junctions
 from .mesh import Mesh
 from .open_sheet import open_sheet
 from .orientation import orient
@@ -16,6 +17,7 @@ from .scraps import without_scraps
 from .sides import Sides
 from .signed import signed_mesh
 from .two_sides import two_sided
+from .zero_set import sharpened
 
 _MENDED = 2  # times, since holes may show where scraps are gone
 
@@ -47,7 +49,8 @@ def sheet_of_sides(
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.2))
     if signed is None:
         return None
-    sheet, unoriented = _finished(open_sheet(signed, band, surface, grid, progress.part(0.2, 0.9)), surface, grid)
+    found = open_sheet(signed, band, surface, grid, progress.part(0.2, 0.8))
+    sheet, unoriented = _finished(found, surface, grid, progress.part(0.8, 1.0))
     return None if unoriented or (sheet.edge_counts()[1] > 2).any() else sheet
 
 
@@ -63,18 +66,22 @@ def sheet_of_crossings(
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress = Progress.of(progress)
-    sheet, unoriented = _finished(dual_contour(crossings, surface, grid, progress.part(0.0, 0.5)), surface, grid)
+    found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
+    sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
     if unoriented and crossings.normal.any():
         signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
         if signed is not None:
-            return _finished(open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9)), surface, grid)
+            found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
+            return _finished(found, surface, grid, progress.part(0.9, 1.0))
     return sheet, unoriented
 
 
-def _finished(mesh, surface, grid):
-    """A sheet mended and wound alike, and the number of edges where that fails."""
+def _finished(mesh, surface, grid, progress):
+    """A sheet mended, wound alike, and sharp where sheets meet or fold, and the number of edges across which it is not
+    wound alike."""
     sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
-    return centred(sheet), unoriented
+    sheet = onto_junctions(sheet, surface, grid.spacing, progress.part(0.0, 0.5))
+    return centred(sharpened(sheet, surface, grid.spacing, progress.part(0.5, 1.0))), unoriented
 
 
 def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
