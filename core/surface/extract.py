@@ -112,19 +112,26 @@ class _Layers:
     @cached_property
     def cover(self) -> Mesh:
         """The double cover: both sides of the single layer, where these are the whole surface."""
-        if self._may_be_sheet() and self.sheet is not None and not self.torn:
-            return both_sides(self.sheet, self.grid.spacing)
+        if self._may_be_sheet() and self._is_manifold() and not self.torn:
+            return both_sides(self.single[0], self.grid.spacing)
         part = self.progress.part(0.7, 1.0, "double cover")
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
 
     def _may_be_sheet(self):
-        """Whether to look for a single layer with two sides. Sheets that meet have none, but a closed shape does whose
-        walls run close, or whose corners look like meetings."""
+        """Whether to look for a single layer with at most two faces at each edge. Sheets that meet have none, but a
+        closed shape does whose walls run close, or whose corners look like meetings."""
         if not _even(self.local, self.grid):
             return False
         if self.meetings.share <= _FEW:
             return True
         return self.meetings.through < _THROUGH and may_be_closed(self.values, self.local, self.grid)
+
+    def _is_manifold(self):
+        """Whether the single layer has at most two faces at each edge. It has where there are two sides, and may have
+        on a one-sided surface; one whose sheets meet is not looked at."""
+        if self.sheet is not None:
+            return True
+        return not self.crossings.normal.any() and (self.single[0].edge_counts()[1] <= 2).all()
 
 
 def _even(local, grid):
@@ -154,9 +161,8 @@ def extract_surfaces(
     """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
     :func:`band_for` says, and the nodes near the surface.
 
-    The double cover is both sides of the single layer, see :mod:`.both_sides`, where that has two, unless sheets meet
-    or pass through each other, or samples are sparse or very dense; else it is extracted at an offset, see
-    :mod:`.double_cover`.
+    The double cover is both sides of the single layer, see :mod:`.both_sides`, unless sheets meet or pass through each
+    other, or samples are sparse or very dense; then it is extracted at an offset, see :mod:`.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,
