@@ -23,14 +23,16 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
     halved, and where parts of the sheet touch in a vertex each gets its own, so that every edge of the result has two
     faces and those around a vertex form one fan. Raises :class:`InputError` for another sheet.
     """
-    ends, count = edges_of(sheet.faces, len(sheet.vertices))
+    edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
     if (count > 2).any():
         raise InputError(f"{(count > 2).sum()} edges of the sheet have more than two faces: use double_cover")
+    ends, alone = np.stack([sheet.faces, np.roll(sheet.faces, -1, axis=1)]), count[edge] == 1
     on_border = np.zeros(len(sheet.vertices), bool)
-    on_border[np.stack(ends)[:, count == 1]] = True
-    if ((count == 2) & on_border[ends[0]] & on_border[ends[1]]).any():
+    on_border[ends[:, alone]] = True
+    if (on_border[ends].all(axis=0) & ~alone).any():
         sheet = _without_chords(sheet, on_border)
-    front, back, n = _vertices_of_sides(sheet)
+        edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
+    front, back, n = _vertices_of_sides(sheet.faces, edge.reshape(-1), count)
     corner = np.empty(n, sheet.faces.dtype)
     corner[front], corner[back] = sheet.faces, sheet.faces
     a, b, c = at_corners(sheet.vertices, sheet.faces)
@@ -44,11 +46,10 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
     return Mesh(sheet.vertices[corner] + normal.T, faces, 2 * sheet.pairs)
 
 
-def _vertices_of_sides(sheet):
+def _vertices_of_sides(faces, edge, count):
     """For either side of the faces the vertices of a closed mesh at their corners, (f,3) each, and their number: one
     for each fan of sides that edges join, round the border from one side to the other."""
-    faces, corners = sheet.faces, sheet.faces.size
-    edge, count = (each.reshape(-1) for each in edge_numbers(faces, len(sheet.vertices)))
+    corners = faces.size
     start = np.arange(corners)
     end = np.roll(start.reshape(faces.shape), -1, axis=1).reshape(-1)
     upwards = (faces < np.roll(faces, -1, axis=1)).reshape(-1)
