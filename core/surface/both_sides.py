@@ -50,7 +50,7 @@ def _vertices_of_sides(faces, edge, count):
     """For either side of the faces the vertices of a closed mesh at their corners, (f,3) each, and their number: one
     for each fan of sides that edges join, round the border from one side to the other."""
     corners = faces.size
-    start = np.arange(corners)
+    start = np.arange(corners, dtype=np.int32)
     end = np.roll(start.reshape(faces.shape), -1, axis=1).reshape(-1)
     upwards = (faces < np.roll(faces, -1, axis=1)).reshape(-1)
     order = np.argsort(edge, kind="stable")
@@ -60,7 +60,8 @@ def _vertices_of_sides(faces, edge, count):
     border = np.concatenate([each[count[edge] == 1] for each in (start, end)])
     links = [(border, border + corners)]
     for here, there in zip((start[one], end[one]), ends, strict=True):
-        links += [(here, there + corners * unlike), (here + corners, there + corners * ~unlike)]
+        across = there + corners
+        links += [(here, np.where(unlike, across, there)), (here + corners, np.where(unlike, there, across))]
     links = tuple(np.concatenate(each) for each in zip(*links, strict=True))
     graph = coo_matrix((np.ones(len(links[0]), bool), links), shape=(2 * corners,) * 2)
     n, vertex = connected_components(graph, directed=False)

@@ -6,31 +6,34 @@ the label spreads over the grid, where each node decides with all its neighbours
 
 Nodes far from the surface fall into regions, of which the one at the box is outside. Between them, the side s of each
 node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the surface and of (s_a + s_b)^2 over those
-that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Nested shells so get alternating
-sides: a hollow ball is inside between its walls, and outside within. Where the outside lies on both sides of most
-samples, as around an open sheet, no side need be asked: nothing is inside.
+that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Farther than two cells from the
+surface, where it crosses no edge, the nodes of a group of 2^3 share their side. Nested shells so get alternating sides:
+a hollow ball is inside between its walls, and outside within. Where the outside lies on both sides of most samples, as
+around an open sheet, no side need be asked: nothing is inside.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import diags
+from scipy.sparse import csr_matrix, diags
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import cg
+from scipy.sparse.linalg import LinearOperator, cg
 from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
 from ..field.grid import Grid, node_strides
 from ..field.local_surface import LocalSurface
 from ..linalg import symmetric
-from ..lookup import is_among
+from ..lookup import is_among, numbered
 from ..progress import Progress
 from .crossings import Crossings
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
 _OFF = 0.7  # cells beyond the distance where regions start, at which samples look for them
+_ALONE = 2.0  # cells from the surface, where no edge is crossed any more: nodes farther off share their sides
 _OUTSIDE = 0.5  # share of the samples with the outside on both sides, above which nothing is inside
 _SPECK = 27  # nodes
 _TOLERANCE, _STEPS = 1e-3, 1000
@@ -100,20 +103,22 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     near, labels, count = _far_regions(values, surface, grid)
     outside = _outside(labels)
     if _is_open(labels, surface, grid):
-        inside = each(np.zeros_like, near)
         low, axis = np.divmod(crossings.changing_sides, 3)
-        return _judged(inside, low, low + node_strides(grid.shape)[axis], np.ones(len(low), bool), grid)
+        edges = [_Edges(low[axis == a], a, np.ones((axis == a).sum(), bool), grid) for a in range(3)]
+        return _judged(each(np.zeros_like, near), edges)
     node = marked_nodes(near)
+    number, n = _numbered(node, at_nodes(values, node) <= _ALONE * grid.spacing, grid)
     cluster = each(lambda label: label.astype(np.int32) - 1, labels)
-    put(cluster, node, count + np.arange(len(node)))
+    put(cluster, node, count + number)
     progress(0.1)
-    a, b, crossed = _edges_of(node, near, crossings, grid)
+    edges = [_edges_along(axis, node, near, crossings, grid) for axis in range(3)]
     progress(0.2)
-    side = _sides(at_nodes(cluster, a), at_nodes(cluster, b), crossed, count + len(node), outside - 1, progress) < 0
+    joined = ((at_nodes(cluster, along.low), at_nodes(cluster, along.high), along.crossed) for along in edges)
+    side = _sides(joined, count + n, outside - 1, progress) < 0
     progress(0.7)
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster))
     progress(0.9)
-    return _judged(inside, a, b, crossed, grid)
+    return _judged(inside, edges)
 
 
 def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
@@ -163,41 +168,78 @@ def _far(surface, grid):
     return float(np.clip(far, _NEAREST, _FARTHEST))
 
 
-def _judged(inside, a, b, crossed, grid):
-    """The sides, with the edges (a, b) that contradict them, (e,) each, of which some are `crossed`."""
-    inside_a = at_nodes(inside, a)
-    differ = inside_a != at_nodes(inside, b)
-    alike, spanned = crossed & ~differ, ~crossed & differ
-    same, gaps = (0.5 * (grid.positions(a[chosen]) + grid.positions(b[chosen])) for chosen in (alike, spanned))
-    return Sides(inside, same, inside_a[alike], gaps, int(crossed.sum()), grid)
+@dataclass(frozen=True)
+class _Edges:
+    """Grid edges along one axis.
+
+    low : (e,) int64, flat indices of their lower ends     crossed : (e,) bool, whether the surface crosses them
+    """
+
+    low: np.ndarray
+    axis: int
+    crossed: np.ndarray
+    grid: Grid
+
+    @property
+    def high(self) -> np.ndarray:
+        """(e,) int64, flat indices of the upper ends."""
+        return self.low + node_strides(self.grid.shape)[self.axis]
+
+    def middles(self, chosen: np.ndarray) -> np.ndarray:
+        """Positions of the middles of those marked in `chosen` (e,), (m,3)."""
+        return self.grid.positions(self.low[chosen]) + 0.5 * self.grid.spacing * np.eye(3)[self.axis]
 
 
-def _edges_of(node, near, crossings, grid):
-    """Grid edges with an end among the nodes, those marked in `near`, none of which lies on the side of the box: their
-    ends (e,), (e,) and whether the surface crosses them."""
-    low, high, crossed = [], [], []
+def _edges_along(axis, node, near, crossings, grid):
+    """The edges along an axis with an end among the nodes, those marked in `near`, none of which lies on the side of
+    the box."""
+    below = node - node_strides(grid.shape)[axis]
+    low = np.concatenate([node, below[~at_nodes(near, below)]])
     changing, along = np.divmod(crossings.changing_sides, 3)
-    for axis, stride in enumerate(node_strides(grid.shape)):
-        below = node - stride
-        for each_low in (node, below[~at_nodes(near, below)]):
-            low.append(each_low)
-            high.append(each_low + stride)
-            crossed.append(is_among(each_low, changing[along == axis]))
-    return tuple(np.concatenate(each) for each in (low, high, crossed))
+    return _Edges(low, axis, is_among(low, changing[along == axis]), grid)
 
 
-def _sides(a, b, crossed, n, outside, progress):
-    """The side of each of n clusters in [-1,1], from edges (a, b) between them; cluster `outside` is 1."""
-    kept = a != b
-    a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
-    degree = np.bincount(np.append(a, b), minlength=n).astype(float)
-    free = (a != outside) & (b != outside)
-    matrix = diags(degree) - symmetric(weight[free], a[free], b[free], n)
-    push = np.bincount((a + b - outside)[~free], weight[~free], n)
+def _judged(inside, edges):
+    """The sides, with the edges that contradict them, from those along each axis."""
+    same, within, gaps = [], [], []
+    for along in edges:
+        low = at_nodes(inside, along.low)
+        differ = low != at_nodes(inside, along.high)
+        alike = along.crossed & ~differ
+        same.append(along.middles(alike))
+        within.append(low[alike])
+        gaps.append(along.middles(~along.crossed & differ))
+    crossed = sum(int(along.crossed.sum()) for along in edges)
+    return Sides(inside, *(np.concatenate(parts) for parts in (same, within, gaps)), crossed, edges[0].grid)
+
+
+def _numbered(node, alone, grid):
+    """Which unknown each node is, (b,) int64, and how many there are: one for each of the nodes marked in `alone` and
+    for each group of 2^3 of the others."""
+    at = np.stack(np.unravel_index(node[~alone], grid.shape)) // 2
+    group, row = numbered(np.ravel_multi_index(tuple(at), grid.shape))
+    number, n = np.empty(len(node), np.int64), int(alone.sum())
+    number[alone] = np.arange(n)
+    number[~alone] = n + row
+    return number, n + len(group)
+
+
+def _sides(edges: Iterable, n, outside, progress):
+    """The side of each of n clusters in [-1,1], from edges between them, parts of (a, b, crossed), (e,) each; cluster
+    `outside` is 1."""
+    links, push, degree = csr_matrix((n, n)), np.zeros(n), np.zeros(n)
+    for a, b, crossed in edges:
+        kept = a != b
+        a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
+        degree += np.bincount(a, minlength=n) + np.bincount(b, minlength=n)
+        free = (a != outside) & (b != outside)
+        links += symmetric(weight[free], a[free], b[free], n)
+        push += np.bincount((a + b - outside)[~free], weight[~free], n)
     progress(0.3)
+    laplacian = LinearOperator((n, n), lambda x: degree * x - links @ x, dtype=float)
     scales = diags(1 / np.maximum(degree, 1.0))
     looks = progress.part(0.4, 0.7).each(range(_STEPS))
-    side, _ = cg(matrix, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
+    side, _ = cg(laplacian, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
     side[outside] = 1
     return side
 

@@ -8,7 +8,7 @@ from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.progress import Progress
 from core.surface.crossings import Crossings
-from core.surface.sides import Sides, _sides, find_sides
+from core.surface.sides import Sides, _numbered, _sides, find_sides
 from tests import shapes
 
 GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
@@ -152,8 +152,23 @@ def test_sides_are_the_least_frustrated_state():
     free = np.arange(n) != outside
     expected = np.ones(n)
     expected[free] = np.linalg.solve(matrix[free][:, free], -matrix[free, outside])
-    found = _sides(a, b, crossed, n, outside, Progress())
+    parts = [(a[:100], b[:100], crossed[:100]), (a[100:], b[100:], crossed[100:])]
+    found = _sides(parts, n, outside, Progress())
     np.testing.assert_allclose(found, expected, atol=0.01)
+
+
+def test_nodes_far_from_the_surface_share_their_unknowns_in_groups():
+    """Of the nodes of a box, those of its lower half alone."""
+    grid = Grid(np.zeros(3), 0.1, (5, 4, 6))
+    node = np.arange(5 * 4 * 6)
+    at = np.stack(np.unravel_index(node, grid.shape), axis=1)
+    alone = at[:, 0] < 2
+    number, n = _numbered(node, alone, grid)
+    assert n == alone.sum() + 2 * 2 * 3
+    np.testing.assert_array_equal(np.unique(number), np.arange(n))
+    same = number[:, None] == number
+    grouped = (at[:, None] // 2 == at // 2).all(axis=2) & ~alone & ~alone[:, None]
+    np.testing.assert_array_equal(same, grouped | np.eye(len(node), dtype=bool))
 
 
 def test_signs():
