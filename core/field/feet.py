@@ -54,6 +54,17 @@ class Feet:
             found[part] = self.distance(x[part].T.astype(np.float32), row)
         return found
 
+    def closest(self, x: np.ndarray, among: np.ndarray) -> np.ndarray:
+        """Which of the feet `among` (c,m) is the closest to each x (3,m) float32: their numbers (m,)."""
+        row, offset = among[0], self.offsets(x, among[0])
+        least = dots(offset, offset)
+        for other in among[1:]:
+            offset = self.offsets(x, other)
+            squared = dots(offset, offset)
+            row = np.where(squared < least, other, row)
+            least = np.minimum(squared, least)
+        return row
+
     def in_cells(self, grid: Grid) -> "Feet":
         """The same in the grid's index space: node (i,j,k) lies at (i,j,k)."""
         centres = (self.centres - grid.origin[:, None]) / grid.spacing

@@ -13,24 +13,18 @@ _TOWARDS = 0.5  # cells, by which the steps of two neighbouring nodes may point 
 
 
 @dataclass(frozen=True)
-class NearBand:
-    """The nodes within two cells of the surface. They are called by their rows, from 0 to b - 1.
+class NodeSet:
+    """Some nodes of a grid. They are called by their rows, from 0 to b - 1.
 
-    shape    : (nx,ny,nz), nodes of the grid
-    node     : (b,) int64, flat index in the grid, ascending     step : (b,3) float64, from the foot point to the node
-    past_rim : (b,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
-    sample   : (b,) int32, the sample nearest to the node
+    shape : (nx,ny,nz), nodes of the grid     node : (b,) int64, flat index in the grid, ascending
     """
 
     shape: tuple[int, int, int]
     node: np.ndarray
-    step: np.ndarray
-    past_rim: np.ndarray
-    sample: np.ndarray
 
     @cached_property
     def ahead(self) -> np.ndarray:
-        """(3,b+1) int64: the row of the next node along each axis, -1 where that is not in the band or past the side of
+        """(3,b+1) int64: the row of the next node along each axis, -1 where that is not in the set or past the side of
         the box. The last column is -1, so that steps may follow each other."""
         found, strides = np.full((3, len(self.node) + 1), -1), node_strides(self.shape)
 
@@ -51,11 +45,25 @@ class NearBand:
         return found
 
     def edges(self, axis: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of the lower and the higher ends of the grid edges along `axis` with both ends in the band, (e,) each,
+        """Rows of the lower and the higher ends of the grid edges along `axis` with both ends in the set, (e,) each,
         the lower ones ascending."""
         high = self.ahead[axis, :-1]
         low = np.flatnonzero(high >= 0)
         return low, high[low]
+
+
+@dataclass(frozen=True)
+class NearBand(NodeSet):
+    """The nodes within two cells of the surface.
+
+    step     : (b,3) float64, from the foot point to the node
+    past_rim : (b,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
+    sample   : (b,) int32, the sample nearest to the node
+    """
+
+    step: np.ndarray
+    past_rim: np.ndarray
+    sample: np.ndarray
 
     def whole_cells(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of the cells whose lowest nodes have these rows (m,), or -1, those with all eight corners in the band: their

@@ -46,7 +46,8 @@ def test_values_are_those_of_the_whole_box(points):
     np.testing.assert_array_equal(found.flat[run.field.near.node], expected.flat[run.field.near.node])
     off = np.abs(found - np.minimum(expected, run.field.band)) / cell
     assert off.mean() < 0.02
-    assert np.percentile(off, 99.9) < 0.5
+    assert np.mean(off > 0.15) < 0.01
+    assert off.max() < 0.75
     assert found.max() == np.float32(run.field.band)
     assert run.field.band == pytest.approx(CELLS * cell)
 
