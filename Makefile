@@ -17,8 +17,8 @@ help: ## list the targets
 demo: $(READY) ## reconstruct the bundled scan into demo/, with a picture
 	$(RUN) -m scripts.demo
 
-test: $(READY) ## run every test that needs no window; ARGS="-k word" picks some
-	$(RUN) -m pytest $(ARGS)
+test: $(READY) ## run every test that needs no window, two at a time; ARGS="-k word" picks some
+	$(RUN) -m pytest -n 2 --dist worksteal $(ARGS)
 
 gui-test: $(READY) ## run the tests in a Blender with a window; BLENDER=/path/to/blender picks it
 	$(RUN) scripts/gui_tests.py $(if $(BLENDER),--blender "$(BLENDER)") $(ARGS)
