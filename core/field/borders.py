@@ -71,6 +71,11 @@ class Rims:
         """(n,) how far the patch covers gaps to either side."""
         return np.maximum(self.reach, self.behind)
 
+    @cached_property
+    def covering(self) -> np.ndarray:
+        """(n,) how far the patch goes across gaps or up to rims."""
+        return np.maximum(self.farthest, self.margin.max(axis=1))
+
 
 def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:
     """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.

@@ -16,18 +16,20 @@ from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import RIM, Rims, chain_lengths, one_sheet
+from .rim_fits import beside, lowest_lines
+from .rim_gaps import RimGaps, find_rim_gaps
 
 _CHAIN = 12  # least number of samples in a row that are a rim; fewer are gaps in the sampling
 _WINDOW = 5.0  # local spacings to either side of a sample, how far its line looks
 _NEAREST = 96  # samples, how many it looks at
 _BINS = 16  # of the window; each keeps its outermost sample
-_CONE, _LIFT = 0.8, 0.2  # samples steeper than this above a sample, and further, are across a bay
+_HALVINGS = 8  # to find a line's slope
 _BENDS = 0.0, 0.05, 0.1, 0.2, 0.4  # upwards, quadratic, over local spacings squared
 _KINKS = 0.5, 1.0, 2.0, 4.0  # upwards, linear, to the right, to the left or to both sides
 _STIFFNESS = 0.15  # area that a bend must save, relative to what it covers itself
-_STEEPEST, _HALVINGS = 2.0, 8  # of the line's slope, and steps to find it
 _BEYOND = 0.07  # the rim lies this far past the line, local spacings
-_FARTHEST = 1.5  # and at most this far past a sample
+_FARTHEST = 1.5  # and at most this far past a sample that is in no gap in the sampling
+_RAISED, _TURNED = 0.2, 0.2  # local spacings further out, at least, that a gap's rim lies; cosine to the way out
 _REACH, _LINES = 2.0, 4  # local spacings from a line's sample to others it bounds; lines tried for each
 _CHUNK = 512  # rim samples
 
@@ -47,23 +49,25 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     def lay(part):
         return _lines(row[part], rims.outward[row[part]], points, normals, spacing, tree)
 
-    lines = [found for _, found in in_order(lay, progress.chunks(len(row), _CHUNK))]
-    lines = _Lines(row, *(np.concatenate(each) for each in zip(*lines, strict=True)))
+    found = [lines for _, lines in in_order(lay, progress.part(0.0, 0.5).chunks(len(row), _CHUNK))]
+    lines = _Lines(row, rims.outward[row], normals[row], *(np.concatenate(each) for each in zip(*found, strict=True)))
+    gaps = find_rim_gaps(row, rims.outward[row], points, normals, spacing, tree, progress.part(0.5, 1.0))
+    lines.lay_over(gaps, normals, spacing)
     margin = rims.margin.copy()
     size = spacing[row]
-    margin[row, 0] = size * _margin(lines.height / np.sqrt(1 + lines.slope**2))
+    margin[row, 0] = size * _margin(lines.height / np.sqrt(1 + lines.slope**2), lines.farthest)
 
     own = np.zeros(len(points), bool)
     own[row] = True
     other = np.flatnonzero(~rims.gap | rims.bridged)
-    way, distance = _nearest_line(lines, rims, other, points, normals, spacing)
+    way, distance = _nearest_line(lines, other, points, normals, spacing)
     known = RIM * spacing
     known[other] = np.where(np.isfinite(distance), distance, known[other])
     known[row] = margin[row, 0]
     ends = rims.ends[row] / size[:, None, None]
-    along, up = (np.einsum("rei,ri->re", ends, axis) for axis in (lines.tangent, rims.outward[row]))
+    along, up = (np.einsum("rei,ri->re", ends, axis) for axis in (lines.tangent, lines.up))
     over = (lines.at(along) - up) / np.sqrt(1 + lines.slope**2)[:, None]
-    margin[row, 1:] = np.minimum(size[:, None] * _margin(over), known[rims.beside[row]])
+    margin[row, 1:] = np.minimum(size[:, None] * _margin(over, lines.farthest[:, None]), known[rims.beside[row]])
 
     ended = distance < np.maximum(spacing, rims.farthest)[other]
     crease, limit = rims.crease.copy(), rims.limit.copy()
@@ -75,10 +79,25 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
 
 
 class _Lines:
-    """Rim lines over samples, in local spacings: height over the tangent plane's axes at each."""
+    """Rim lines over samples, in local spacings: height along `up` (r,3) at places along `tangent` (r,3).
 
-    def __init__(self, row, tangent, height, slope, bend):
-        self.row, self.tangent, self.height, self.slope, self.bend = row, tangent, height, slope, bend
+    farthest : (r,) how far past its sample the rim may lie
+    """
+
+    def __init__(self, row, up, normals, height, slope, bend):
+        self.row, self.up, self.tangent = row, up, np.cross(normals, up)
+        self.height, self.slope, self.bend = height, slope, bend
+        self.farthest = np.full(len(row), _FARTHEST)
+
+    def lay_over(self, gaps: RimGaps, normals, spacing):
+        """Take the rim across gaps in the sampling instead, where it lies further out there."""
+        of, row = gaps.of, self.row[gaps.of]
+        height = gaps.depth / spacing[row]
+        higher = height > self.height[of] / np.sqrt(1 + self.slope[of] ** 2) + _RAISED
+        higher &= row_dots(gaps.up, self.up[of]) > _TURNED
+        of, row = of[higher], row[higher]
+        self.up[of], self.tangent[of] = gaps.up[higher], np.cross(normals[row], gaps.up[higher])
+        self.height[of], self.slope[of], self.bend[of], self.farthest[of] = height[higher], 0.0, 0.0, np.inf
 
     def at(self, along, of=slice(None)):
         """Height of lines (r,) at places (r,p) along them."""
@@ -90,31 +109,23 @@ class _Lines:
         return self.slope[of] + 2 * quadratic * along + np.where(along > 0, right, -left)
 
 
-def _margin(height):
-    return np.clip(height + _BEYOND, 0, _FARTHEST)
+def _margin(height, farthest):
+    return np.clip(height + _BEYOND, 0, farthest)
 
 
 def _lines(row, outward, points, normals, spacing, tree):
-    """Tangents (r,3), heights, slopes (r,) and bends (r,3) of the lines of least area over samples `row`."""
-    distance, other = tree.query(points[row], k=min(_NEAREST, len(points)), workers=-1)
-    size = spacing[row, None]
-    step = points[other] - points[row, None]
-    tangent = np.cross(normals[row], outward)
-    along, up = (np.einsum("rki,ri->rk", step, axis) / size for axis in (tangent, outward))
-    counts = one_sheet(step, normals[row, None], normals[other]) & (distance < _WINDOW * size)
-    counts &= up <= _CONE * np.abs(along) + _LIFT
-    along, up = _outermost(along, np.where(counts, up, -np.inf))
-    window = np.minimum(_WINDOW, distance[:, -1] / size[:, 0])
-
+    """Heights, slopes (r,) and bends (r,3) of the lines of least area over samples `row`."""
+    around = beside(row, outward, spacing[row], points, normals, tree, _WINDOW, _NEAREST)
+    along, up = around.outermost(_WINDOW, _BINS)
     least = np.full(len(row), np.inf)
     height, slope, bend = np.zeros(len(row)), np.zeros(len(row)), np.zeros((len(row), 3))
     for tried in _shapes():
-        a, b = _lowest(along, up - _bent(tried, along))
-        own = tried[0] * window**2 / 3 + (tried[1] + tried[2]) * window / 4
+        a, b = lowest_lines(along, up - _bent(tried, along), _HALVINGS)
+        own = tried[0] * around.window**2 / 3 + (tried[1] + tried[2]) * around.window / 4
         area = a + (1 + _STIFFNESS) * own
         less = area < least
         least[less], height[less], slope[less], bend[less] = area[less], a[less], b[less], tried
-    return tangent, height, slope, bend
+    return height, slope, bend
 
 
 def _shapes():
@@ -128,32 +139,7 @@ def _bent(bend, along):
     return quadratic * along**2 + right * np.maximum(along, 0) + left * np.maximum(-along, 0)
 
 
-def _lowest(along, up):
-    """Height over 0 and slope, (r,) each, of the lowest straight lines above points (r,p) that include 0, 0."""
-    low, high = np.full(len(along), -_STEEPEST), np.full(len(along), _STEEPEST)
-    every = np.arange(len(along))
-    for _ in range(_HALVINGS):
-        slope = (low + high) / 2
-        touched = along[every, (up - slope[:, None] * along).argmax(axis=1)]
-        low, high = np.where(touched >= 0, slope, low), np.where(touched <= 0, slope, high)
-    slope = (low + high) / 2
-    return (up - slope[:, None] * along).max(axis=1), slope
-
-
-def _outermost(along, up):
-    """The highest of points (r,k) in each bin, after the own sample at 0, 0: two arrays (r,1+bins)."""
-    held = np.zeros((len(along), 1 + _BINS))
-    highest = np.full((len(along), 1 + _BINS), -np.inf)
-    highest[:, 0] = 0
-    bins = 1 + np.clip(((along / _WINDOW + 1) * _BINS / 2).astype(int), 0, _BINS - 1)
-    order = np.argsort(up, axis=1)
-    row = np.broadcast_to(np.arange(len(along))[:, None], order.shape)
-    along, up, bins = (np.take_along_axis(each, order, axis=1) for each in (along, up, bins))
-    held[row, bins], highest[row, bins] = along, up  # of one bin the last, which is the highest
-    return held, highest
-
-
-def _nearest_line(lines, rims, other, points, normals, spacing):
+def _nearest_line(lines, other, points, normals, spacing):
     """Unit direction (m,3) towards the nearest line and distance (m,) to the rim there for samples `other`, inf where
     none of the nearest rim samples' lines is that of their sheet."""
     far, near = KDTree(points[lines.row]).query(points[other], k=range(1, 1 + min(_LINES, len(lines.row))), workers=-1)
@@ -161,8 +147,8 @@ def _nearest_line(lines, rims, other, points, normals, spacing):
     for far_k, of in zip(far.T, near.T, strict=True):
         row = lines.row[of]
         step, size = points[other] - points[row], spacing[row]
-        along, up = (row_dots(step, axis) / size for axis in (lines.tangent[of], rims.outward[row]))
-        towards = rims.outward[row] - lines.steepness(along, of)[:, None] * lines.tangent[of]
+        along, up = (row_dots(step, axis) / size for axis in (lines.tangent[of], lines.up[of]))
+        towards = lines.up[of] - lines.steepness(along, of)[:, None] * lines.tangent[of]
         length = np.linalg.norm(towards, axis=1)
         distance = size * (np.maximum((lines.at(along[:, None], of)[:, 0] - up) / length, 0) + _BEYOND)
         closer = one_sheet(step, normals[row], normals[other]) & (far_k < _REACH * size) & (distance < found)
