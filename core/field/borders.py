@@ -48,7 +48,7 @@ class Rims:
     opening   : (n,) float64, cosine of half its angle
     beside    : (n,2) int64, the two neighbours that bound it     ends : (n,2,3) float64, steps to them
     margin    : (n,3) float64, how far the sheet goes on past the sample and past those two neighbours, at rims
-    reach     : (n,) float64, how far the patch covers a bridged gap
+    reach     : (n,) float64, how far the patch covers a bridged gap, or up to a rim across a gap in the sampling
     behind    : (n,) float64, how far it covers a gap opposite to that one, at lines of samples; 0 elsewhere
     crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ; any where there is none
     limit     : (n,2) float64, distance to them, inf where there is none
@@ -70,11 +70,6 @@ class Rims:
     def farthest(self) -> np.ndarray:
         """(n,) how far the patch covers gaps to either side."""
         return np.maximum(self.reach, self.behind)
-
-    @cached_property
-    def covering(self) -> np.ndarray:
-        """(n,) how far the patch goes across gaps or up to rims."""
-        return np.maximum(self.farthest, self.margin.max(axis=1))
 
 
 def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:

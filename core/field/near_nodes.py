@@ -19,7 +19,7 @@ _WIDE = 0.25  # of the box, that the patch of a sample reaches
 def sample_reach(surface: LocalSurface) -> np.ndarray:
     """How far the patch of each sample covers the surface, (n,), units of the samples."""
     rims = surface.rims
-    return np.maximum(DISC * surface.spacing, rims.covering)
+    return np.maximum(np.maximum(DISC * surface.spacing, rims.farthest), rims.margin.max(axis=1))
 
 
 def near_nodes(surface: LocalSurface, grid: Grid, width: float, progress=None) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 from ..linalg import dots
 from .borders import DISC, OPPOSITE, Rims
 
+_STEEPEST = 0.999  # change of a margin along an edge, where one disc holds the other
 _TINY = np.finfo(np.float32).tiny
 
 
@@ -61,7 +62,7 @@ class Patches:
         owner, at, away = own.take(row), flat.take(row, axis=1), length.take(row)
         along = dots(at, self.outward.take(owner, axis=1))
         open_side, bridged = along > away * self.opening.take(owner), self.bridged.take(owner)
-        covered = np.where(open_side & bridged, self.reach.take(owner), radius.take(row))
+        covered = np.where(open_side, np.maximum(self.reach.take(owner), radius.take(row)), radius.take(row))
         opposite = along < -OPPOSITE * away
         radius[row] = np.where(opposite, np.maximum(covered, self.behind.take(owner)), covered)
         rim = np.flatnonzero(open_side & ~bridged)
@@ -81,10 +82,19 @@ class Patches:
 
 def _past_edges(lateral, ends, margin):
     """Of the two segments [0, end], with ends (2,3,p), whose margins (3,p) change along them evenly, the one that
-    `lateral` (3,p) is least far out of the margin of: how far out, and the step (3,p) out of it."""
+    `lateral` (3,p) is least far out of the margin of: how far out, and the step (3,p) out of it.
+
+    The distance to the discs around a segment, of radius r0 + k t at t along it, is least d k / sqrt(1 - k^2) past the
+    foot of the perpendicular, of length d.
+    """
     found = []
     for end, last in zip(ends, margin[1:], strict=True):
-        share = np.clip(dots(lateral, end) / np.maximum(dots(end, end), _TINY), 0, 1)
+        squared = np.maximum(dots(end, end), _TINY)
+        along = dots(lateral, end)
+        length = np.sqrt(squared)
+        away = np.sqrt(np.maximum(dots(lateral, lateral) - along**2 / squared, 0))
+        taper = np.clip((last - margin[0]) / length, -_STEEPEST, _STEEPEST)
+        share = np.clip((along / length + away * taper / np.sqrt(1 - taper**2)) / length, 0, 1)
         step = lateral - share * end
         length = np.sqrt(dots(step, step))
         found.append((length - (1 - share) * margin[0] - share * last, length, step))

@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
+from .borders import one_sheet
 from .rim_fits import Beside, beside, lowest_lines
 
 _WINDOW = 11.0  # usual spacings to either side of a sample, how far its line looks
@@ -28,6 +29,7 @@ _SAVED = 5.0  # squared usual spacings, that a bent line may save of the area be
 _ON = 0.5  # usual spacings below the line, where samples still lie on it
 _SHALLOW, _DEEP = 0.3, 3.0  # usual spacings, that those in a gap lie below it
 _CHANCE = 0.01  # gaps of the largest area that are expected among as many samples at rims
+_AHEAD, _ASKED = 0.8, 12  # of the depth, where samples of other sheets are looked for, and among how many
 _CHUNK = 128  # rim samples
 
 
@@ -45,16 +47,22 @@ class RimGaps:
     depth: np.ndarray
 
 
-def find_rim_gaps(row, outward, points, normals, spacing, tree: KDTree, progress=None) -> RimGaps:
-    """Which samples at rims, `row` (r,) with ways out of the sheet (r,3), lie in gaps of the sampling.
-
-    points, normals : (n,3) float64     spacing : (n,) local spacing     tree : of the points
-    """
+def spacing_around(row, points, spacing, tree: KDTree) -> tuple[np.ndarray, np.ndarray]:
+    """The usual spacing around samples in `row` (r,), the median of the nearest 32, and whether these lie at random,
+    (r,) bool, rather than evenly spaced."""
     near = tree.query(points[row], k=range(1, 1 + min(_USUAL, len(points))), workers=-1)[1]
-    usual = np.median(spacing[near], axis=1)
     some, at = np.unique(near, return_inverse=True)
     nearest = tree.query(points[some], k=[2], workers=-1)[0][:, 0] / spacing[some]
-    random = np.flatnonzero(np.median(nearest[at.reshape(near.shape)], axis=1) <= _RANDOM)
+    at_random = np.median(nearest[at.reshape(near.shape)], axis=1) <= _RANDOM
+    return np.median(spacing[near], axis=1), at_random
+
+
+def find_rim_gaps(row, outward, usual, at_random, points, normals, tree: KDTree, progress=None) -> RimGaps:
+    """Which samples at rims, `row` (r,) with ways out of the sheet (r,3), lie in gaps of the sampling.
+
+    usual, at_random : (r,), see :func:`spacing_around`     points, normals : (n,3) float64     tree : of the points
+    """
+    random = np.flatnonzero(at_random)
     number = np.full(len(points), -1)
     number[row] = np.arange(len(row))
     most = _left_by_chance(len(row))
@@ -78,7 +86,18 @@ def find_rim_gaps(row, outward, points, normals, spacing, tree: KDTree, progress
     gap, across, depth = gap[order], across[order], depth[order]
     own = normals[row[gap]]
     up = across - row_dots(across, own)[:, None] * own
-    return RimGaps(gap, up / np.linalg.norm(up, axis=1, keepdims=True), depth)
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    free = _nothing_ahead(row[gap], up, depth, points, normals, tree)
+    return RimGaps(gap[free], up[free], depth[free])
+
+
+def _nothing_ahead(row, up, depth, points, normals, tree):
+    """Whether no samples of other sheets lie around the rim that samples `row` (g,) are `depth` (g,) off, (g,) bool:
+    where sheets meet or run close, a sheet goes on behind them."""
+    distance, other = tree.query(points[row] + _AHEAD * depth[:, None] * up, k=min(_ASKED, len(points)), workers=-1)
+    step = points[other] - points[row, None]
+    own = one_sheet(step, normals[row, None], normals[other]) | (other == row[:, None])
+    return (own | (distance > depth[:, None])).all(axis=1)
 
 
 def _left_by_chance(n):

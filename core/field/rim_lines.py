@@ -17,7 +17,7 @@ from ..parallel import in_order
 from ..progress import Progress
 from .borders import RIM, Rims, chain_lengths, one_sheet
 from .rim_fits import beside, lowest_lines
-from .rim_gaps import RimGaps, find_rim_gaps
+from .rim_gaps import RimGaps, find_rim_gaps, spacing_around
 
 _CHAIN = 12  # least number of samples in a row that are a rim; fewer are gaps in the sampling
 _WINDOW = 5.0  # local spacings to either side of a sample, how far its line looks
@@ -27,16 +27,17 @@ _HALVINGS = 8  # to find a line's slope
 _BENDS = 0.0, 0.05, 0.1, 0.2, 0.4  # upwards, quadratic, over local spacings squared
 _KINKS = 0.5, 1.0, 2.0, 4.0  # upwards, linear, to the right, to the left or to both sides
 _STIFFNESS = 0.15  # area that a bend must save, relative to what it covers itself
-_BEYOND = 0.07  # the rim lies this far past the line, local spacings
+_BEYOND = 0.07, 0.04  # the rim lies this far past the line, local spacings: of samples at random, evenly spaced ones
 _FARTHEST = 1.5  # and at most this far past a sample that is in no gap in the sampling
 _RAISED, _TURNED = 0.2, 0.2  # local spacings further out, at least, that a gap's rim lies; cosine to the way out
 _REACH, _LINES = 2.0, 4  # local spacings from a line's sample to others it bounds; lines tried for each
+_FAR_REACH, _AT_CORNERS, _TURNED_OFF = 3.0, 16, 0.5  # of samples in gaps, at corners; largest cosine of rims there
 _CHUNK = 512  # rim samples
 
 
 def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=None) -> Rims:
-    """The rims with margins up to the lines through their outermost samples, and with other samples' patches, bridged
-    gaps too, ended at those lines.
+    """The rims with margins up to the lines through their outermost samples, or across gaps in the sampling, and with
+    patches of other samples, bridged gaps too, ended at those lines.
 
     points, normals : (n,3) float64     spacing : (n,) local spacing     tree : of the points
     """
@@ -50,12 +51,16 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
         return _lines(row[part], rims.outward[row[part]], points, normals, spacing, tree)
 
     found = [lines for _, lines in in_order(lay, progress.part(0.0, 0.5).chunks(len(row), _CHUNK))]
-    lines = _Lines(row, rims.outward[row], normals[row], *(np.concatenate(each) for each in zip(*found, strict=True)))
-    gaps = find_rim_gaps(row, rims.outward[row], points, normals, spacing, tree, progress.part(0.5, 1.0))
+    usual, at_random = spacing_around(row, points, spacing, tree)
+    beyond = np.where(at_random, *_BEYOND)
+    fits = (np.concatenate(each) for each in zip(*found, strict=True))
+    lines = _Lines(row, rims.outward[row], normals[row], *fits, beyond)
+    part = progress.part(0.5, 1.0)
+    gaps = find_rim_gaps(row, rims.outward[row], usual, at_random, points, normals, tree, part)
     lines.lay_over(gaps, normals, spacing)
     margin = rims.margin.copy()
     size = spacing[row]
-    margin[row, 0] = size * _margin(lines.height / np.sqrt(1 + lines.slope**2), lines.farthest)
+    margin[row, 0] = size * lines.margin(lines.height / np.sqrt(1 + lines.slope**2))
 
     own = np.zeros(len(points), bool)
     own[row] = True
@@ -67,37 +72,49 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     ends = rims.ends[row] / size[:, None, None]
     along, up = (np.einsum("rei,ri->re", ends, axis) for axis in (lines.tangent, lines.up))
     over = (lines.at(along) - up) / np.sqrt(1 + lines.slope**2)[:, None]
-    margin[row, 1:] = np.minimum(size[:, None] * _margin(over, lines.farthest[:, None]), known[rims.beside[row]])
+    margin[row, 1:] = np.minimum(size[:, None] * lines.margin(over.T).T, known[rims.beside[row]])
 
-    ended = distance < np.maximum(spacing, rims.farthest)[other]
+    across = row[np.isinf(lines.farthest)]
+    reach = rims.reach.copy()
+    reach[across] = margin[across, 0]
+    corner = _nearest_line(lines, across, points, normals, spacing, lines.up[np.isinf(lines.farthest)])
+    other = np.concatenate([other, across])
+    way, distance = (np.concatenate(pair) for pair in zip((way, distance), corner, strict=True))
+    ended = distance < np.maximum(spacing, np.maximum(reach, rims.behind))[other]
     crease, limit = rims.crease.copy(), rims.limit.copy()
     slot = np.isfinite(limit[other, 0]).astype(int)
     ended &= ~np.isfinite(limit[other, slot])
     limit[other[ended], slot[ended]] = distance[ended]
     crease[other[ended], slot[ended]] = way[ended]
-    return replace(rims, margin=margin, crease=crease, limit=limit)
+    return replace(rims, margin=margin, reach=reach, crease=crease, limit=limit)
 
 
 class _Lines:
     """Rim lines over samples, in local spacings: height along `up` (r,3) at places along `tangent` (r,3).
 
-    farthest : (r,) how far past its sample the rim may lie
+    beyond   : (r,) how far past the line the rim lies
+    farthest : (r,) how far past its sample it may
     """
 
-    def __init__(self, row, up, normals, height, slope, bend):
+    def __init__(self, row, up, normals, height, slope, bend, beyond):
         self.row, self.up, self.tangent = row, up, np.cross(normals, up)
-        self.height, self.slope, self.bend = height, slope, bend
+        self.height, self.slope, self.bend, self.beyond = height, slope, bend, beyond
         self.farthest = np.full(len(row), _FARTHEST)
 
     def lay_over(self, gaps: RimGaps, normals, spacing):
         """Take the rim across gaps in the sampling instead, where it lies further out there."""
         of, row = gaps.of, self.row[gaps.of]
         height = gaps.depth / spacing[row]
-        higher = height > self.height[of] / np.sqrt(1 + self.slope[of] ** 2) + _RAISED
+        own = np.minimum(self.height[of] / np.sqrt(1 + self.slope[of] ** 2), _FARTHEST)
+        higher = height > own + _RAISED
         higher &= row_dots(gaps.up, self.up[of]) > _TURNED
         of, row = of[higher], row[higher]
         self.up[of], self.tangent[of] = gaps.up[higher], np.cross(normals[row], gaps.up[higher])
         self.height[of], self.slope[of], self.bend[of], self.farthest[of] = height[higher], 0.0, 0.0, np.inf
+
+    def margin(self, height):
+        """How far the rims lie past places so far below the lines, (...,r)."""
+        return np.clip(height + self.beyond, 0, self.farthest)
 
     def at(self, along, of=slice(None)):
         """Height of lines (r,) at places (r,p) along them."""
@@ -107,10 +124,6 @@ class _Lines:
         """Slope of lines (m,) at one place each, (m,)."""
         quadratic, right, left = self.bend[of].T
         return self.slope[of] + 2 * quadratic * along + np.where(along > 0, right, -left)
-
-
-def _margin(height, farthest):
-    return np.clip(height + _BEYOND, 0, farthest)
 
 
 def _lines(row, outward, points, normals, spacing, tree):
@@ -139,10 +152,12 @@ def _bent(bend, along):
     return quadratic * along**2 + right * np.maximum(along, 0) + left * np.maximum(-along, 0)
 
 
-def _nearest_line(lines, other, points, normals, spacing):
+def _nearest_line(lines, other, points, normals, spacing, across=None):
     """Unit direction (m,3) towards the nearest line and distance (m,) to the rim there for samples `other`, inf where
-    none of the nearest rim samples' lines is that of their sheet."""
-    far, near = KDTree(points[lines.row]).query(points[other], k=range(1, 1 + min(_LINES, len(lines.row))), workers=-1)
+    none of the nearest rim samples' lines is that of their sheet; with directions `across` (m,3), of the rims that turn
+    off those at corners."""
+    most, reach = (_LINES, _REACH) if across is None else (_AT_CORNERS, _FAR_REACH)
+    far, near = KDTree(points[lines.row]).query(points[other], k=range(1, 1 + min(most, len(lines.row))), workers=-1)
     way, found = np.zeros((len(other), 3)), np.full(len(other), np.inf)
     for far_k, of in zip(far.T, near.T, strict=True):
         row = lines.row[of]
@@ -150,8 +165,10 @@ def _nearest_line(lines, other, points, normals, spacing):
         along, up = (row_dots(step, axis) / size for axis in (lines.tangent[of], lines.up[of]))
         towards = lines.up[of] - lines.steepness(along, of)[:, None] * lines.tangent[of]
         length = np.linalg.norm(towards, axis=1)
-        distance = size * (np.maximum((lines.at(along[:, None], of)[:, 0] - up) / length, 0) + _BEYOND)
-        closer = one_sheet(step, normals[row], normals[other]) & (far_k < _REACH * size) & (distance < found)
+        distance = size * (np.maximum((lines.at(along[:, None], of)[:, 0] - up) / length, 0) + lines.beyond[of])
+        closer = one_sheet(step, normals[row], normals[other]) & (far_k < reach * size) & (distance < found)
+        if across is not None:
+            closer &= row_dots(lines.up[of], across) < _TURNED_OFF
         found[closer], way[closer] = distance[closer], towards[closer]
     way -= row_dots(way, normals[other])[:, None] * normals[other]
     return way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny), found

@@ -188,7 +188,7 @@ def test_poisson_agrees_with_transport(points):
     assert 0 < apart.mean() < 0.4
     assert np.percentile(apart, 95) < 1.0
     near = run.field.values < run.field.spacing
-    assert np.mean(run.field.values[near] == other.field.values[near]) > 0.999  # but where feet close a crack
+    assert np.mean(run.field.values[near] == other.field.values[near]) > 0.998  # but where feet close a crack
 
 
 def test_nodes_take_the_closest_foot_of_their_own_and_their_neighbours(random):

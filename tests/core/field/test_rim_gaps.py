@@ -1,12 +1,14 @@
 """Gaps in the sampling at straight rims, on squares whose sides are known. Lengths are usual spacings, about 0.02."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
 from core.field import rim_lines
 from core.field.local_surface import fit_local_surface
-from core.field.rim_gaps import RimGaps, find_rim_gaps
+from core.field.rim_gaps import RimGaps, find_rim_gaps, spacing_around
 from core.points import local_spacing
 from tests import shapes
 
@@ -18,6 +20,12 @@ def square(n=2500, seed=0):
     return np.random.default_rng(seed).random((n, 2))
 
 
+def jittered_grid():
+    x, y = np.meshgrid(np.arange(50.0), np.arange(50.0))
+    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, (2500, 2))
+    return SPACING * (np.column_stack([x.ravel(), y.ravel()]) + jitter)
+
+
 def surface_of(points):
     points = np.column_stack([points, np.zeros(len(points))])
     normals = np.tile([0.0, 0, 1], (len(points), 1))
@@ -25,7 +33,8 @@ def surface_of(points):
 
 
 def gaps_at(surface, row, outward):
-    return find_rim_gaps(row, outward, surface.points, surface.normals, surface.spacing, surface.tree)
+    around = spacing_around(row, surface.points, surface.spacing, surface.tree)
+    return find_rim_gaps(row, outward, *around, surface.points, surface.normals, surface.tree)
 
 
 def below(surface, depth):
@@ -67,6 +76,25 @@ def test_rims_run_across_gaps_of_chance(monkeypatch):
     assert across < 0.83 * missing()
 
 
+def test_the_rim_of_a_gap_may_lie_far_from_its_samples(monkeypatch):
+    """More than a spacing and a half, beyond which nothing else is covered."""
+
+    def gaps(row, outward, usual, at_random, points, *_):
+        of = np.flatnonzero((abs(points[row, 0] - 0.5) < 2 * SPACING) & (points[row, 1] < 4 * SPACING))
+        return RimGaps(of, np.tile([0.0, -1, 0], (len(of), 1)), points[row[of], 1])
+
+    points = jittered_grid()
+    points = points[(abs(points[:, 0] - 0.5) > 2 * SPACING) | (points[:, 1] > 2.5 * SPACING)]
+    surface = surface_of(points)
+    deep = surface.points[below(surface, 4)[0], :2]
+    deep = deep[(abs(deep[:, 0] - 0.5) < 2 * SPACING) & (deep[:, 1] > 2.5 * SPACING)]
+    x = np.column_stack([deep[:, 0], np.full(len(deep), 0.2 * SPACING)])
+    assert len(x) > 0
+    assert share_covered(surface, x) == 0
+    monkeypatch.setattr(rim_lines, "find_rim_gaps", gaps)
+    assert share_covered(surface_of(points), x) == 1
+
+
 @pytest.mark.parametrize(("width", "depth"), [(7, 5), (10, 4)])
 def test_wide_bays_stay_open(width, depth, monkeypatch):
     """Of a bay hardly more is covered than without a look at gaps."""
@@ -102,23 +130,49 @@ def test_curved_rims_have_no_gaps():
 
 def test_evenly_spaced_samples_leave_no_gaps_by_chance():
     """A notch in the side of a grid is a notch."""
-    x, y = np.meshgrid(np.arange(50.0), np.arange(50.0))
-    grid = SPACING * np.column_stack([x.ravel(), y.ravel()])
-    grid += np.random.default_rng(0).uniform(-0.2, 0.2, grid.shape) * SPACING
+    grid = jittered_grid()
     surface = surface_of(grid[np.hypot(grid[:, 0] - 0.5, grid[:, 1]) > 2.2 * SPACING])
     assert not len(gaps_at(surface, *below(surface, 3)).of)
 
 
-def test_signs_of_normals_and_closed_surfaces_do_not_matter(random):
+def test_a_sheet_that_ends_at_another_has_no_deep_gaps_there():
+    """What looks like its rim is where the sheets meet."""
+    points = np.column_stack([square(seed=1), np.zeros(2500)])
+    points = points[np.hypot(points[:, 0] - 0.5, points[:, 1]) > 2 * SPACING]
+    wall = square(seed=2) * [1, 0.5] - [0, 0.25]
+    wall = np.column_stack([wall[:, 0], np.zeros(2500), wall[:, 1]])
+    row = np.flatnonzero(points[:, 1] < 2.5 * SPACING)
+    outward, normals = np.tile([0.0, -1, 0], (len(row), 1)), np.tile([0.0, 0, 1], (len(points), 1))
+
+    def deepest(points, normals):
+        around = spacing_around(row, points, local_spacing(points), KDTree(points))
+        return find_rim_gaps(row, outward, *around, points, normals, KDTree(points)).depth.max()
+
+    both = np.concatenate([points, wall]), np.concatenate([normals, np.tile([0.0, 1, 0], (2500, 1))])
+    assert deepest(points, normals) > 2 * SPACING
+    assert deepest(*both) < 1.3 * SPACING
+
+
+def test_signs_of_normals_do_not_matter(random):
     surface = surface_of(square(900))
     row, outward = below(surface, 3)
     found = gaps_at(surface, row, outward)
     signs = random.choice([-1.0, 1.0], (len(surface.points), 1))
-    turned = find_rim_gaps(
-        row, outward, surface.points, signs * surface.normals, surface.spacing, KDTree(surface.points)
-    )
+    turned = gaps_at(replace(surface, normals=signs * surface.normals), row, outward)
     np.testing.assert_array_equal(found.of, turned.of)
     np.testing.assert_allclose(found.depth, turned.depth, atol=0.01 * SPACING)
+
+
+def test_without_rims_there_are_no_gaps():
     points = shapes.sphere(500)
-    none = find_rim_gaps(np.empty(0, int), np.empty((0, 3)), points, points, local_spacing(points), KDTree(points))
+    none = find_rim_gaps(np.empty(0, int), np.empty((0, 3)), *np.empty((2, 0)), points, points, KDTree(points))
     assert len(none.of) == len(none.up) == 0
+
+
+@pytest.mark.parametrize(("points", "random"), [(square(), True), (jittered_grid(), False)])
+def test_random_samples_are_told_from_even_ones(points, random):
+    """The usual spacing is the median, whatever the sample's own."""
+    surface = surface_of(points)
+    usual, at_random = spacing_around(np.arange(100), surface.points, surface.spacing, surface.tree)
+    assert (at_random == random).mean() > 0.9
+    np.testing.assert_allclose(usual, np.median(surface.spacing), rtol=0.3)
