@@ -78,15 +78,20 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     reach = rims.reach.copy()
     reach[across] = margin[across, 0]
     corner = _nearest_line(lines, across, points, normals, spacing, lines.up[np.isinf(lines.farthest)])
-    other = np.concatenate([other, across])
-    way, distance = (np.concatenate(pair) for pair in zip((way, distance), corner, strict=True))
-    ended = distance < np.maximum(spacing, np.maximum(reach, rims.behind))[other]
+    lines_at = (np.concatenate(pair) for pair in zip((other, way, distance), (across, *corner), strict=True))
+    return _ended(replace(rims, margin=margin, reach=reach), *lines_at, spacing)
+
+
+def _ended(rims, sample, way, distance, spacing):
+    """The rims with patches of samples (m,) ended at lines in directions (m,3) and distances (m,), where those are
+    shorter than the patches reach and no two creases do so already."""
+    ended = distance < np.maximum(spacing, rims.farthest)[sample]
     crease, limit = rims.crease.copy(), rims.limit.copy()
-    slot = np.isfinite(limit[other, 0]).astype(int)
-    ended &= ~np.isfinite(limit[other, slot])
-    limit[other[ended], slot[ended]] = distance[ended]
-    crease[other[ended], slot[ended]] = way[ended]
-    return replace(rims, margin=margin, reach=reach, crease=crease, limit=limit)
+    slot = np.isfinite(limit[sample, 0]).astype(int)
+    ended &= ~np.isfinite(limit[sample, slot])
+    limit[sample[ended], slot[ended]] = distance[ended]
+    crease[sample[ended], slot[ended]] = way[ended]
+    return replace(rims, crease=crease, limit=limit)
 
 
 class _Lines:
