@@ -17,6 +17,7 @@ from ..parallel import in_order
 from ..progress import Progress
 from .borders import one_sheet
 from .rim_fits import Beside, beside, lowest_lines
+from .sampling_gaps import largest_empty_area
 
 _WINDOW = 11.0  # usual spacings to either side of a sample, how far its line looks
 _NEAREST = 260  # samples, how many it looks at
@@ -65,7 +66,7 @@ def find_rim_gaps(row, outward, usual, at_random, points, normals, tree: KDTree,
     random = np.flatnonzero(at_random)
     number = np.full(len(points), -1)
     number[row] = np.arange(len(row))
-    most = _left_by_chance(len(row))
+    most = largest_empty_area(len(row), _CHANCE)
 
     def look(part):
         line = random[part]
@@ -98,12 +99,6 @@ def _nothing_ahead(row, up, depth, points, normals, tree):
     step = points[other] - points[row, None]
     own = one_sheet(step, normals[row, None], normals[other]) | (other == row[:, None])
     return (own | (distance > depth[:, None])).all(axis=1)
-
-
-def _left_by_chance(n):
-    """The largest area, squared spacings, that chance leaves empty beside n samples at rims: n A exp(-A) is _CHANCE."""
-    logarithm = np.log(max(n, 3) / _CHANCE)
-    return logarithm + np.log(logarithm)
 
 
 def _straight_lines(around: Beside):

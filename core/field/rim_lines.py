@@ -74,10 +74,11 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     over = (lines.at(along) - up) / np.sqrt(1 + lines.slope**2)[:, None]
     margin[row, 1:] = np.minimum(size[:, None] * lines.margin(over.T).T, known[rims.beside[row]])
 
-    across = row[np.isinf(lines.farthest)]
+    in_gap = np.isinf(lines.farthest)
+    across = row[in_gap]
     reach = rims.reach.copy()
     reach[across] = margin[across, 0]
-    corner = _nearest_line(lines, across, points, normals, spacing, lines.up[np.isinf(lines.farthest)])
+    corner = _nearest_line(lines, across, points, normals, spacing, lines.up[in_gap])
     lines_at = (np.concatenate(pair) for pair in zip((other, way, distance), (across, *corner), strict=True))
     return _ended(replace(rims, margin=margin, reach=reach), *lines_at, spacing)
 

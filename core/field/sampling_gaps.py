@@ -137,10 +137,15 @@ def _far_from(rim, points, spacing):
     return KDTree(points[rim]).query(points, workers=-1)[0] > _NEXT * spacing
 
 
+def largest_empty_area(n: int, expected: float = 1.0) -> float:
+    """The area A, squared spacings, that chance leaves empty in `expected` places among n: n A exp(-A) is that."""
+    logarithm = np.log(max(n, 3) / expected)
+    return logarithm + np.log(logarithm)
+
+
 def _left_by_chance(n):
     """How wide a gap there may be among n random samples, local spacings."""
-    logarithm = np.log(max(n, 3))
-    return _CHANCE * np.sqrt(4 / np.pi * (logarithm + np.log(logarithm)))
+    return _CHANCE * np.sqrt(4 / np.pi * largest_empty_area(n))
 
 
 def _apart_halfway(row, other, points, normals, bend):

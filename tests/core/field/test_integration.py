@@ -153,20 +153,18 @@ class TestAlone:
         projected = surface.project(grid.positions(near), nearest=FROM_NODES).distance
         np.testing.assert_allclose(values.flat[near], projected, atol=1e-6)
 
-    def test_hardly_anywhere_is_it_more_than_to_a_foot(self):
+    def test_nowhere_is_it_more_than_to_a_foot(self):
         """Where sheets meet, patches do not quite, and projections between them are too long."""
         points, normals = scattered_junction(1500)
         surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
-        grid = fit_grid(points, 64)
+        grid = fit_grid(points, 80)
         values, near = distance_field(surface, grid)
         projected = surface.project(grid.positions(near.node), nearest=FROM_NODES)
         _, feet = settled_feet(surface, grid, near.node, projected, Progress())
         found, bound = values.flat[near.node], feet.distances(grid.positions(near.node))
         away = found > 0.7 * grid.spacing
-        over = (found - bound)[away] / grid.spacing
-        assert (over < 0.2).mean() > 0.9995
-        assert over.max() < 1
-        assert ((projected.distance - bound)[away] > 0.3 * grid.spacing).sum() > 10
+        assert ((found - bound)[away] < 0.2 * grid.spacing).all()
+        assert ((projected.distance - bound)[away] > 0.3 * grid.spacing).sum() > 20
 
     def test_reports_in_order_and_stops_when_told(self, stage):
         seen = []

@@ -65,5 +65,5 @@ def test_excess_is_that_of_the_definition(rims, random):
     beyond, step = Patches.of(rims).excess(sample, lateral, spacing)
     for at in np.ndindex(*sample.shape):
         distance, way = expected(rims, sample[at], lateral[(slice(None), *at)].astype(float), float(spacing[at]))
-        np.testing.assert_allclose(beyond[at], distance, atol=3e-5)
-        np.testing.assert_allclose(step[(slice(None), *at)], way, atol=3e-5)
+        np.testing.assert_allclose(beyond[at], distance, atol=1e-5)
+        np.testing.assert_allclose(step[(slice(None), *at)], way, atol=1e-5)
