@@ -8,7 +8,7 @@ from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.progress import Progress
 from core.surface.crossings import Crossings
-from core.surface.sides import Sides, _numbered, _sides, find_sides
+from core.surface.sides import Sides, _numbered, _sides, find_sides, may_be_closed
 from tests import shapes
 
 GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
@@ -101,9 +101,9 @@ def test_an_inner_wall_has_the_inside_on_both_faces(surface):
     assert sides.share > 0.05
 
 
-@pytest.mark.parametrize(("share", "inside_found"), [(0.0, True), (0.4, True), (0.6, False), (1.0, False)])
-def test_with_the_outside_on_both_sides_of_most_samples_nothing_is_inside(share, inside_found):
-    """A ball of radius 1/2 below an open square: that share of the samples is the square's."""
+def ball_and_square(share):
+    """A ball of radius 1/2 below an open square, of which that share of the samples is: distances to both, whether
+    nodes lie inside the ball, crossings, how many of them are the square's, and the surface."""
     count = int(share * 1000)
     height = GRID.positions(np.arange(29**3)).reshape(*GRID.shape, 3) - [0, 0, 0.96]
     ball = np.linalg.norm(height - [0, 0, -1.46], axis=-1)
@@ -123,11 +123,28 @@ def test_with_the_outside_on_both_sides_of_most_samples_nothing_is_inside(share,
     normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (count, 1)), out])
     points = np.concatenate([place, [0, 0, -0.5] + 0.5 * out])
     surface = fit_local_surface(points, normals, np.ones(1000), np.full(1000, 0.06), 3.0)
-    sides = find_sides(np.minimum(np.abs(ball - 0.5), square), both, surface, GRID)
-    np.testing.assert_array_equal(sides.inside, (ball < 0.5) & inside_found)
-    assert sides.share == pytest.approx(len(above) / len(both.node) if inside_found else 1.0)
+    return np.minimum(np.abs(ball - 0.5), square), ball < 0.5, both, len(above), surface
+
+
+@pytest.mark.parametrize(("share", "inside_found"), [(0.0, True), (0.4, True), (0.6, False), (1.0, False)])
+def test_with_the_outside_on_both_sides_of_most_samples_nothing_is_inside(share, inside_found):
+    distance, in_ball, crossings, above, surface = ball_and_square(share)
+    sides = find_sides(distance, crossings, surface, GRID)
+    np.testing.assert_array_equal(sides.inside, in_ball & inside_found)
+    assert sides.share == pytest.approx(above / len(crossings.node) if inside_found else 1.0)
     assert not sides.within.any()
     assert sides.spanned == 0
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.0, True), (0.04, True), (0.1, False), (0.4, False), (1.0, False)])
+def test_a_shape_with_the_outside_on_both_sides_of_many_samples_is_not_closed(share, expected):
+    distance, _, _, _, surface = ball_and_square(share)
+    assert may_be_closed(distance, surface, GRID) == expected
+
+
+def test_walls_so_close_that_no_region_lies_between_may_be_closed(surface):
+    """Then no sample has a region on both sides."""
+    assert may_be_closed(np.where(RADIUS > 1, RADIUS - 1, 0.0), surface, GRID)
 
 
 def test_a_speck_is_no_inside(surface):
