@@ -4,7 +4,8 @@ Dual contouring ends a sheet at whole cells, and a local surface's rims run thro
 borders that zigzag. Here each border is faired: the step d off its vertices' places x minimises the integral of
 d^2 + (s^2 (x + d)'')^2 along it, an implicit step of bi-Laplacian flow (Desbrun et al., SIGGRAPH 1999) in arc length,
 which keeps what is longer than about six smoothing lengths s and does not shorten the border as Laplacian flow does.
-Reweighting keeps corners, where the faired border turns fast, and holds back vertices that go far.
+At corners (see :mod:`.rim_corners`) it turns as it likes. Reweighting keeps others, where the faired border turns fast,
+and holds back vertices that go far.
 """
 
 from dataclasses import replace
@@ -16,11 +17,13 @@ from scipy.sparse.linalg import spsolve
 from ..field.local_surface import LocalSurface
 from ..linalg import COMPONENTS, cross, lengths, principal_axes, row_dots
 from .mesh import Mesh, at_corners, edge_numbers
+from .rim_corners import Border
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
 _LENGTH = 1.5  # smoothing length, local spacings
 _FARTHEST = 0.3  # local spacings, no border moves further
-_CORNER = 0.5  # radians over the smoothing length, a border that turns faster has a corner
+_FREE = 0.25  # local spacings to either side of a corner, where borders turn as they like
+_CORNER = 0.5  # radians over the smoothing length, a border that turns faster is held less
 _REWEIGHTED = 6
 _SHORTEST = 0.2  # cells, shorter edges count as this long
 _ROWS, _CLEAR = 2, 2  # beside borders, that are evened out, and beside edges where sheets meet, that are not
@@ -66,7 +69,7 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     if at is not None:
         vertices[loop] = at[loop]
     spacing = surface.spacing[surface.tree.query(vertices[loop], workers=-1)[1]]
-    step = _fairing(vertices, loop, beside, spacing, cell)
+    step = _fairing(Border(vertices, loop, beside), spacing, cell)
     step -= row_dots(step, axis)[:, None] * axis
     length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(float).tiny)
     vertices[loop] += step * np.minimum(1.0, _FARTHEST * spacing / length)[:, None]
@@ -126,22 +129,24 @@ def _neighbours(border, loop):
     return head[order][first[:, None] + np.arange(2)]
 
 
-def _fairing(vertices, loop, beside, spacing, cell):
+def _fairing(border, spacing, cell):
     """Steps (l,3) that fair the borders."""
+    vertices, loop, beside = border.vertices, border.loop, border.beside
     at, every = vertices[loop], np.arange(len(loop))
     h = np.maximum(np.linalg.norm(vertices[beside] - at[:, None], axis=2), _SHORTEST * cell)
     mass = h.mean(axis=1)
     column = np.concatenate([loop, beside[:, 0], beside[:, 1]])
     value = np.concatenate([-(1 / h).sum(axis=1), *(1 / h).T])
     turn = coo_matrix((value, (np.tile(every, 3), column)), shape=(len(loop), len(vertices))).tocsr()
-    held, weight = mass.copy(), np.ones(len(loop))  # x'' is turn @ x / mass
+    free = border.within(_FREE * spacing, border.corners(spacing))
+    held, weight = mass.copy(), np.where(free, 0.0, 1.0)  # x'' is turn @ x / mass
     there, size = turn @ vertices, _LENGTH * spacing
     turn = turn[:, loop]
     for _ in range(_REWEIGHTED):
         stiff = turn.T @ diags(weight * size**4 / mass)
         step = spsolve((diags(held) + stiff @ turn).tocsc(), -(stiff @ there))
         angle = np.linalg.norm(there + turn @ step, axis=1) * size / mass
-        weight = 1 / (1 + (angle / _CORNER) ** 4)
+        weight = np.where(free, 0.0, 1 / (1 + (angle / _CORNER) ** 4))
         held *= np.maximum(1.0, np.linalg.norm(step, axis=1) / (_FARTHEST * spacing))
     return step
 
