@@ -139,14 +139,14 @@ def _fairing(border, spacing, cell):
     value = np.concatenate([-(1 / h).sum(axis=1), *(1 / h).T])
     turn = coo_matrix((value, (np.tile(every, 3), column)), shape=(len(loop), len(vertices))).tocsr()
     free = border.within(_FREE * spacing, border.corners(spacing))
-    held, weight = mass.copy(), np.where(free, 0.0, 1.0)  # x'' is turn @ x / mass
+    held, weight = mass.copy(), ~free  # x'' is turn @ x / mass
     there, size = turn @ vertices, _LENGTH * spacing
     turn = turn[:, loop]
     for _ in range(_REWEIGHTED):
         stiff = turn.T @ diags(weight * size**4 / mass)
         step = spsolve((diags(held) + stiff @ turn).tocsc(), -(stiff @ there))
         angle = np.linalg.norm(there + turn @ step, axis=1) * size / mass
-        weight = np.where(free, 0.0, 1 / (1 + (angle / _CORNER) ** 4))
+        weight = ~free / (1 + (angle / _CORNER) ** 4)
         held *= np.maximum(1.0, np.linalg.norm(step, axis=1) / (_FARTHEST * spacing))
     return step
 

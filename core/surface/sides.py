@@ -124,10 +124,9 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
 def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
     """Whether the sides of :func:`find_sides`, from the same distances, may be closed: not where many of the samples
     that have regions on both sides have one region there. On shapes that are closed it is less than 1 % of them."""
-    labels = _far_regions(values, surface, grid)[1]
-    one, other = regions_beside(labels, surface, _far(surface, grid) * grid.spacing, grid).T
-    seen = (one > 0) & (other > 0)
-    return (seen & (one == other)).sum() <= _OPEN * seen.sum()
+    one, other = _seen(_far_regions(values, surface, grid)[1], surface, grid).T
+    both = (one > 0) & (other > 0)
+    return (both & (one == other)).sum() <= _OPEN * both.sum()
 
 
 def _far_regions(values, surface, grid):
@@ -143,8 +142,12 @@ def _outside(labels):
 
 
 def _is_open(labels, surface, grid):
-    seen = regions_beside(labels, surface, _far(surface, grid) * grid.spacing, grid)
-    return (seen == _outside(labels)).all(axis=1).mean() > _OUTSIDE
+    return (_seen(labels, surface, grid) == _outside(labels)).all(axis=1).mean() > _OUTSIDE
+
+
+def _seen(labels, surface, grid):
+    """The regions of :func:`_far_regions` on either side of each sample, (n,2); 0 where there is none."""
+    return regions_beside(labels, surface, _far(surface, grid) * grid.spacing, grid)
 
 
 def regions_beside(labels, surface: LocalSurface, level: float, grid: Grid) -> np.ndarray:

@@ -26,13 +26,15 @@ def zigzag(x, seed, height=0.15):
     return x + np.pad(height * mean, ((0, 0), (0, 1)))
 
 
+def border(x, loop):
+    """Of vertices (v,3) in order round a closed border, with the numbers `loop` (l,) in any order."""
+    return Border(x, loop, np.stack([loop - 1, loop + 1], axis=1) % len(x))
+
+
 def corners_of(x, order=None):
     """Which of the vertices (v,3) of a closed border are corners, (v,) bool."""
-    n = len(x)
-    loop = np.arange(n) if order is None else order
-    beside = np.stack([(loop - 1) % n, (loop + 1) % n], axis=1)
-    found = np.zeros(n, bool)
-    found[loop] = Border(x, loop, beside).corners(np.ones(n))
+    loop, found = np.arange(len(x)) if order is None else order, np.zeros(len(x), bool)
+    found[loop] = border(x, loop).corners(np.ones(len(x)))
     return found
 
 
@@ -71,8 +73,7 @@ def test_a_border_that_turns_little_has_none(degrees, expected):
 
 def test_a_cut_off_corner_counts_where_the_sides_would_meet():
     cut = SIDE * np.array([[0.0, 0], [1, 0], [1, 1 - 0.5 / SIDE], [1 - 0.5 / SIDE, 1], [0, 1]])
-    x = np.concatenate([outline(cut[k : k + 2], closed=False) for k in range(5 - 1)] + [outline(cut[[4, 0]], False)])
-    x = x[np.linalg.norm(np.diff(x, axis=0, append=x[:1]), axis=1) > 1e-9]
+    x = outline(cut)
     place = x[corners_of(x), :2]
     assert len(place) == 4
     assert np.linalg.norm(place - SIDE, axis=1).min() < 0.6
@@ -88,16 +89,13 @@ def test_there_are_none_right_beside_the_end_of_a_border(past, expected):
     """Where it runs into a line at which sheets meet, one of whose vertices is the last, so far past the corner."""
     x = outline(SQUARE[:3], closed=False)
     loop = np.arange(1, int((SIDE + past) / STEP))
-    border = Border(x, loop, np.stack([loop - 1, loop + 1], axis=1))
-    assert border.corners(np.ones(len(loop))).sum() == expected
+    assert border(x, loop).corners(np.ones(len(loop))).sum() == expected
 
 
 def test_what_is_within_reach_of_a_corner_along_the_border():
     x = outline(SQUARE)
-    n = len(x)
-    loop = np.arange(n)
-    border = Border(x, loop, np.stack([(loop - 1) % n, (loop + 1) % n], axis=1))
-    found = border.within(np.full(n, 0.6), loop == 0)
+    n, loop = len(x), np.arange(len(x))
+    found = border(x, loop).within(np.full(n, 0.6), loop == 0)
     np.testing.assert_array_equal(np.flatnonzero(found), [0, 1, 2, n - 2, n - 1])
 
 
