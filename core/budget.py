@@ -17,24 +17,25 @@ from .settings import BESIDE_OFFSET, WITH_SIDES, Settings
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 _BAND = 4.0  # cells, the band that is advised at least
 
-# Measured on 86 runs over 100 to 200,000 samples, resolutions of 64 to 512: the Voronoi diagram by samples, the field
-# by nodes, the meshes by nodes and by squared cells of the surface. One is over before the next begins.
-_MEMORY = {"diagram": 40.0, "sample": 2.2e-3, "field": 45.0, "node": 31e-6, "meshes": 55.0, "held node": 8e-6}  # MiB
+# Fitted to 57 runs over 500 to 100,000 samples at resolutions of 64 to 256, within .6 to 1.7 of what they held, least
+# sure for one-sided surfaces: the Voronoi diagram by samples, the field by nodes, the meshes by nodes and by squared
+# cells of the surface. One is over before the next begins.
+_MEMORY = {"diagram": 35.0, "sample": 2.4e-3, "field": 43.0, "node": 31e-6, "meshes": 40.0, "held node": 10e-6}  # MiB
 _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
 _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
-_MESHES = {"none": 0.0, "double": 3.0e-3, "single": 3.6e-3, "both": 5e-3, "signed": 3.6e-3}
+_MESHES = {"none": 0.0, "double": 3.6e-3, "single": 3e-3, "both": 5e-3, "signed": 4.5e-3}
 
 # The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
 _BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
 
-# Processor seconds where the probe takes _PROBE of them; fitted to 41 runs over 500 to 20,000 samples at resolutions of
-# 128 and 256, and 512 in a band: estimates are about .6 to 1.4 of what was taken. Noise: to eight clouds.
-_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.25, 7.5e-5, 1e-4
-_NEAR_NODE, _NODE = 2.4e-6, 5e-8
+# Processor seconds where the probe takes _PROBE of them; fitted to the same runs, within .6 to 1.6 of what they
+# took; what a band takes to five at resolutions up to 512, and noise to eight clouds.
+_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.36, 6e-5, 1e-4
+_NEAR_NODE, _NODE = 2e-6, 4.7e-8
 _BAND_NEAR_NODE, _BAND_NODE = 4.8e-6, 1.5e-6
-_COVER, _SIDES = 2.9e-5, 5.6e-5  # for a squared cell of the surface: its double cover alone, and a single layer
+_COVER, _SIDES = 3.4e-5, 4.9e-5  # for a squared cell of the surface: its double cover alone, and a single layer
 _PROBE = 0.0042
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it

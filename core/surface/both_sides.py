@@ -1,13 +1,12 @@
-"""The double cover of a sheet: both its sides, joined at its borders."""
+"""The double cover of a sheet: both its sides, joined at its borders and around the edges where sheets meet."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from ..errors import InputError
-from ..linalg import cross, lengths
+from ..linalg import cross, dots, lengths, symmetric
 from .layers import HAIR
 from .mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
 
@@ -15,95 +14,150 @@ from .mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_u
 def both_sides(sheet: Mesh, cell: float) -> Mesh:
     """A closed mesh with a layer on either side of a sheet, wound so that normals point away from it: an outer and an
     inner piece for a closed one with two sides, a single piece for an open one, whose layers meet in its border
-    vertices, and for a one-sided one.
+    vertices, and for a one-sided one; where sheets meet, a piece for each region that they part.
 
-    sheet : at most two faces at each edge, wound alike or not     cell : length of one, in the units of the mesh
+    sheet : any, wound alike or not     cell : length of one, in the units of the mesh
 
-    The layers are a hair apart, 3e-4 cells. Where an edge inside of the sheet has both its ends on a border it is
-    halved, and where parts of the sheet touch in a vertex each gets its own, so that every edge of the result has two
-    faces and those around a vertex form one fan. Raises :class:`InputError` for another sheet.
+    The layers are a hair apart, 3e-4 cells. Around an edge, those sides of its faces are joined that face each other.
+    Where two pairs of them have the same vertices at both its ends, as where these are on a border, they are joined in
+    two halves, and where parts of the sheet touch in a vertex each gets its own, so that every edge of the result has
+    two faces and those around a vertex form one fan.
     """
-    edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
-    if (count > 2).any():
-        raise InputError(f"{(count > 2).sum()} edges of the sheet have more than two faces: use double_cover")
-    ends, alone = np.stack([sheet.faces, np.roll(sheet.faces, -1, axis=1)]), count[edge] == 1
-    on_border = np.zeros(len(sheet.vertices), bool)
-    on_border[ends[:, alone]] = True
-    if (on_border[ends].all(axis=0) & ~alone).any():
-        sheet = _without_chords(sheet, on_border)
-        edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
-    front, back, n = _vertices_of_sides(sheet.faces, edge.reshape(-1), count)
-    corner = np.empty(n, sheet.faces.dtype)
-    corner[front], corner[back] = sheet.faces, sheet.faces
+    sheet = _turned(sheet)
+    sides = _sides(sheet)
+    place = np.empty(sides.vertex.max(initial=-1) + 1, sheet.faces.dtype)
+    place[sides.vertex] = sheet.faces
+    vertices = np.concatenate([sheet.vertices[place], sheet.vertices[sides.halved].mean(axis=0)])
     a, b, c = at_corners(sheet.vertices, sheet.faces)
-    normal = np.stack([_total(x, front, n) - _total(x, back, n) for x in cross(b - a, c - a)])
+    normal = np.stack([_totals(x, sides, len(vertices)) for x in cross(b - a, c - a)])
     normal *= 0.5 * HAIR * cell / np.maximum(lengths(normal), np.finfo(float).tiny)  # at borders both sides cancel
-    halves = np.arange(len(front))
-    halves[: 2 * sheet.pairs] = np.roll(halves[: 2 * sheet.pairs], sheet.pairs)
-    cuts = [sheet.pairs, 2 * sheet.pairs]
-    parts = zip(np.split(front, cuts), np.split(back[halves][:, [0, 2, 1]], cuts), strict=True)
-    faces = np.concatenate([part for both in parts for part in both])
-    return Mesh(sheet.vertices[corner] + normal.T, faces, 2 * sheet.pairs)
+    return _joined(vertices + normal.T, sides, sheet.pairs)
 
 
-def _vertices_of_sides(faces, edge, count):
-    """For either side of the faces the vertices of a closed mesh at their corners, (f,3) each, and their number: one
-    for each fan of sides that edges join, round the border from one side to the other."""
-    corners = faces.size
-    start = np.arange(corners, dtype=np.int32)
-    end = np.roll(start.reshape(faces.shape), -1, axis=1).reshape(-1)
-    upwards = (faces < np.roll(faces, -1, axis=1)).reshape(-1)
-    order = np.argsort(edge, kind="stable")
-    one, other = order[count[edge[order]] == 2].reshape(-1, 2).T
-    unlike = upwards[one] == upwards[other]
-    ends = np.where(unlike, [start[other], end[other]], [end[other], start[other]])
-    border = np.concatenate([each[count[edge] == 1] for each in (start, end)])
-    links = [(border, border + corners)]
-    for here, there in zip((start[one], end[one]), ends, strict=True):
-        across = there + corners
-        links += [(here, np.where(unlike, across, there)), (here + corners, np.where(unlike, there, across))]
-    links = tuple(np.concatenate(each) for each in zip(*links, strict=True))
-    graph = coo_matrix((np.ones(len(links[0]), bool), links), shape=(2 * corners,) * 2)
+@dataclass(frozen=True)
+class _Sides:
+    """How the sides of a sheet's faces are joined, the fronts before the backs.
+
+    vertex : (2,f,3) int32, the vertices of a closed mesh at their corners, one for each fan of sides that edges join
+    middle : (2,f,3) int32, for the edges from these corners to the next ones the further vertices in their middle, the
+             same for both sides that are joined there; -1 where there is none
+    halved : (2,m) int32, the vertices of the sheet that these middles are between
+    """
+
+    vertex: np.ndarray
+    middle: np.ndarray
+    halved: np.ndarray
+
+
+def _sides(sheet):
+    """Around each edge its faces are in order of their angles, and the side of each that faces ahead is joined to the
+    side of the next one that faces back; of a face alone, both its sides."""
+    corner, corners = sheet.faces.reshape(-1), sheet.faces.size
+    edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
+    edge = edge.reshape(-1)
+    here, after = np.arange(corners), _after(np.arange(corners))
+    upwards = corner < corner[after]
+    ends = np.stack([np.where(upwards, here, after), np.where(upwards, after, here)])
+    order, several = np.argsort(edge, kind="stable"), np.repeat(count, count)
+    line = np.flatnonzero(several > 2)
+    if len(line):
+        angle = _angles(sheet, *corner[[*ends[:, order[line]], _after(after[order[line]])]])
+        order[line] = order[line][np.lexsort((angle, edge[order[line]]))]
+    following, last = np.roll(order, -1), np.cumsum(count) - 1
+    following[last] = order[last - count + 1]
+    ahead, back = corners * ~upwards[order], corners * upwards[following]
+    links = (ends[:, order] + ahead).reshape(-1), (ends[:, following] + back).reshape(-1)
+    graph = coo_matrix((np.ones(2 * corners, bool), links), shape=(2 * corners,) * 2)
     n, vertex = connected_components(graph, directed=False)
-    front, back = vertex.astype(faces.dtype).reshape(2, *faces.shape)
-    return front, back, n
+    met = vertex[:corners] == vertex[corners:]
+    row = np.flatnonzero((several > 2) | ((several == 2) & (met & met[after])[order]))
+    row = row[_alike(edge[order[row]], *vertex[(ends[:, order] + ahead)[:, row]])]
+    middle = np.full(2 * corners, -1, sheet.faces.dtype)
+    middle[order[row] + ahead[row]] = middle[following[row] + back[row]] = n + np.arange(len(row))
+    shape = 2, *sheet.faces.shape
+    return _Sides(vertex.astype(middle.dtype).reshape(shape), middle.reshape(shape), corner[ends[:, order[row]]])
 
 
-def _total(x, faces, n):
-    """Sums of x (f,) over the faces (f,3) of each of n vertices, (n,)."""
-    return np.bincount(faces.reshape(-1), np.repeat(x, 3), n)
+def _after(corner):
+    """The next corner of the same face."""
+    return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
-def _without_chords(mesh, on_border):
-    """The mesh with no edge of two faces that has both its ends on a border, `on_border` (v,) bool: diagonals of quads
-    are turned where the other one has not, and what edges are left are halved."""
-    mesh, n = _turned(mesh, on_border), len(mesh.vertices)
-    ends, count = edges_of(mesh.faces, n)
-    ends = np.stack(ends)
-    low, high = ends[:, (count == 2) & on_border[ends].all(axis=0)]
-    if not len(low):
-        return mesh
-    total = n + len(low)
-    middle = coo_matrix((np.arange(n, total), (low, high)), shape=(total, total)).tocsr()
-    whole = (looked_up(middle, mesh.faces, np.roll(mesh.faces, -1, axis=1)) == 0).all(axis=1)
-    rest, halved = mesh.of_faces(whole), mesh.faces[~whole]
+def _alike(*keys):
+    """Which of some rows, by their `keys` (m,) each, there are more than one of, (m,) bool."""
+    order = np.lexsort(keys)
+    same = np.all([np.diff(key[order]) == 0 for key in keys], axis=0)
+    found = np.zeros(len(order), bool)
+    found[order[1:][same]] = found[order[:-1][same]] = True
+    return found
+
+
+def _angles(sheet, low, high, third):
+    """How far faces with the vertices `low`, `high` and `third`, (m,) each, are turned about the edge from the first to
+    the second: (m,) radians, from a direction that is the same for all at this edge. The third vertex is taken in the
+    middle of itself and those beside it that are on no such edge, since faces are often folded there."""
+    edges, n = sheet.edge_counts()[0], len(sheet.vertices)
+    off = np.ones(n, bool)
+    off[low], off[high] = False, False
+    edges = edges[off[edges].all(axis=1)]
+    beside = symmetric(np.ones(len(edges)), *edges.T, n)[third]
+    start, middle = sheet.vertices[low], sheet.vertices[third] + beside @ sheet.vertices
+    middle /= 1 + np.diff(beside.indptr)[:, None]
+    along, to = (sheet.vertices[high] - start).T, (middle - start).T
+    across = cross(along, np.eye(3)[:, np.abs(along).argmin(axis=0)])
+    return np.arctan2(dots(cross(along, across), to), lengths(along) * dots(across, to))
+
+
+def _totals(x, sides, n):
+    """Sums of x (f,) over the sides that each of n vertices has, less over the backs, (n,)."""
+    found = np.zeros(n)
+    for at in (sides.vertex, sides.middle):
+        front, back = (np.bincount(of.reshape(-1) + 1, np.repeat(x, 3), n + 1)[1:] for of in at)
+        found += front - back
+    return found
+
+
+def _joined(vertices, sides, pairs):
+    """The closed mesh of the sides of faces the first of which are halves of so many `pairs`."""
+    halves = np.arange(sides.vertex.shape[1])
+    halves[: 2 * pairs] = np.roll(halves[: 2 * pairs], pairs)
+    cuts = [pairs, 2 * pairs]
+
+    def both(front, back):
+        parts = zip(np.split(front, cuts), np.split(back[halves], cuts), strict=True)
+        return np.concatenate([part for both in parts for part in both])
+
+    faces = both(sides.vertex[0], sides.vertex[1][:, [0, 2, 1]])
+    return _halved(Mesh(vertices, faces, 2 * pairs), both(sides.middle[0], sides.middle[1][:, ::-1]))
+
+
+def _halved(mesh, middle):
+    """The mesh with the edges of faces halved that have a vertex in the `middle`, (f,3), from each corner to the next;
+    -1 where there is none."""
+    cut = (middle >= 0).any(axis=1)
+    rest, faces, middle = mesh.of_faces(~cut), mesh.faces[cut], middle[cut]
     for _ in range(3):
-        found = looked_up(middle, halved, np.roll(halved, -1, axis=1))
-        cut = found.any(axis=1)
-        side = (found > 0).argmax(axis=1)[:, None]
-        a, b, c = np.take_along_axis(halved, (side + np.arange(3)) % 3, axis=1)[cut].T
-        m = np.take_along_axis(found, side, axis=1)[cut, 0]
-        halved = np.concatenate([halved[~cut], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)])
-    vertices = np.concatenate([mesh.vertices, 0.5 * (mesh.vertices[low] + mesh.vertices[high])])
-    return replace(rest, vertices=vertices, faces=np.concatenate([rest.faces, halved.astype(rest.faces.dtype)]))
+        cut = (middle >= 0).any(axis=1)
+        turn = ((middle >= 0).argmax(axis=1)[:, None] + np.arange(3)) % 3
+        (a, b, c), (m, next_, last) = (np.take_along_axis(x, turn, axis=1)[cut].T for x in (faces, middle))
+        none = np.full_like(m, -1)
+        faces = np.concatenate([faces[~cut], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)])
+        middle = np.concatenate([middle[~cut], np.stack([none, none, last], 1), np.stack([none, next_, none], 1)])
+    return replace(rest, faces=np.concatenate([rest.faces, faces]))
 
 
-def _turned(mesh, on_border):
-    """The mesh with the diagonal of each quad turned that leads from border to border where the other one does not, and
-    is no edge."""
-    quads, table = mesh.quads, edge_table(mesh.faces, len(mesh.vertices))
+def _turned(sheet):
+    """The sheet with the diagonal of each quad turned that leads from border to border where the other one does not,
+    and is no edge."""
+    ends, count = edges_of(sheet.faces, len(sheet.vertices))
+    on_border = np.zeros(len(sheet.vertices), bool)
+    on_border[np.stack(ends)[:, count == 1]] = True
+    quads = sheet.quads
     row = np.flatnonzero(on_border[quads[:, ::2]].all(axis=1) & ~on_border[quads[:, 1::2]].all(axis=1))
-    row = row[looked_up(table, quads[row, 1], quads[row, 3]) == 0]
-    faces = mesh.faces.copy()
-    faces[row], faces[mesh.pairs + row] = quads[row][:, [1, 2, 3]], quads[row][:, [1, 3, 0]]
-    return replace(mesh, faces=faces)
+    if not len(row):
+        return sheet
+    (a, b, c, d), table = quads[row].T, edge_table(sheet.faces, len(sheet.vertices))
+    row = row[(looked_up(table, a, c) == 2) & (looked_up(table, b, d) == 0)]
+    faces = sheet.faces.copy()
+    faces[row], faces[sheet.pairs + row] = quads[row][:, [1, 2, 3]], quads[row][:, [1, 3, 0]]
+    return replace(sheet, faces=faces)

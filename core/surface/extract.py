@@ -28,6 +28,8 @@ _BETTER = 0.5  # times that distance, below which it is taken
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _THROUGH = 0.125  # of those, at least: sheets that pass through each other
+_BESIDE = 0.05  # of those, at most, beside sheets so close that single layers are torn
+_SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
 
 
 @dataclass(frozen=True)
@@ -112,26 +114,34 @@ class _Layers:
     @cached_property
     def cover(self) -> Mesh:
         """The double cover: both sides of the single layer, where these are the whole surface."""
-        if self._may_be_sheet() and self._is_manifold() and not self.torn:
+        if self._may_be_sheet() and self._is_whole() and not self.torn:
             return both_sides(self.single[0], self.grid.spacing)
         part = self.progress.part(0.7, 1.0, "double cover")
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
 
     def _may_be_sheet(self):
-        """Whether to look for a single layer with at most two faces at each edge. Sheets that meet have none, but a
-        closed shape does whose walls run close, or whose corners look like meetings."""
+        """Whether to look for a single layer. Sheets that pass through each other have one with handles; sheets side by
+        side have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
         if not _even(self.local, self.grid):
             return False
         if self.meetings.share <= _FEW:
             return True
-        return self.meetings.through < _THROUGH and may_be_closed(self.values, self.local, self.grid)
+        if self.meetings.through >= _THROUGH:
+            return False
+        return self.meetings.beside <= _BESIDE or may_be_closed(self.values, self.local, self.grid)
 
-    def _is_manifold(self):
-        """Whether the single layer has at most two faces at each edge. It has where there are two sides, and may have
-        on a one-sided surface; one whose sheets meet is not looked at."""
+    def _is_whole(self):
+        """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
+        surface, and where sheets meet if its lines are where samples show that, none of them side by side."""
         if self.sheet is not None:
             return True
-        return not self.crossings.normal.any() and (self.single[0].edge_counts()[1] <= 2).all()
+        sheet, meetings = self.single[0], self.meetings
+        edges, count = sheet.edge_counts()
+        line = np.unique(edges[count > 2])
+        if not len(line):
+            return not self.crossings.normal.any()
+        sample = self.local.tree.query(sheet.vertices[line])[1]
+        return meetings.beside <= _BESIDE and meetings.at[sample].mean() >= _SEEN
 
 
 def _even(local, grid):
@@ -161,8 +171,9 @@ def extract_surfaces(
     """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
     :func:`band_for` says, and the nodes near the surface.
 
-    The double cover is both sides of the single layer, see :mod:`.both_sides`, unless sheets meet or pass through each
-    other, or samples are sparse or very dense; then it is extracted at an offset, see :mod:`.double_cover`.
+    The double cover is both sides of the single layer, see :mod:`.both_sides`, unless sheets pass through each other or
+    run side by side, or meet where samples do not show it, or samples are sparse or very dense; then it is extracted at
+    an offset, see :mod:`.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

@@ -6,16 +6,14 @@ import numpy as np
 
 from ..field.local_surface import LocalSurface
 from ..linalg import row_dots, symmetric
-from ..progress import Progress
 from .mesh import Mesh
 from .planes import to_planes
 from .sheets import Sheets, sheets_near
 
-_ROUNDS = 2
 _RINGS = 3  # of vertices around a line, whose sheets are known there
 _NEAR = 1.2  # cells, from a vertex to a sheet that counts
 _STEEP = 0.8  # largest |n . n'| of sheets that meet; others run side by side
-_STIFFNESS = 0.02
+_STIFFNESS, _ROUNDS = 0.02, 2
 
 
 def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None) -> Mesh:
@@ -24,19 +22,17 @@ def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None
 
     The samples nearest to such a vertex may all be of one sheet, so those that vertices around know are told to it.
     """
-    progress = Progress.of(progress)
     edges, count = mesh.edge_counts()
     line = np.unique(edges[count > 2])
     if not len(line):
         return mesh
     around, towards = _around(edges, line, len(mesh.vertices))
     vertices = mesh.vertices.copy()
-    for turn in range(_ROUNDS):
-        part = progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)
-        sheets = sheets_near(surface, vertices[np.append(line, around)], towards, cell, part)
-        sheets = sheets[(np.abs(sheets.tau) <= _NEAR * cell) & (sheets.node < len(line))]
+    sheets = sheets_near(surface, vertices[np.append(line, around)], towards, cell, progress)
+    sheets = sheets[(np.abs(sheets.tau) <= _NEAR * cell) & (sheets.node < len(line))]
+    meet = _least_cosine(sheets, len(line)) < _STEEP
+    for _ in range(_ROUNDS):
         step = to_planes(vertices[line], sheets.node, sheets.foot, sheets.axis, _STIFFNESS)
-        meet = _least_cosine(sheets, len(line)) < _STEEP
         vertices[line[meet]] += step[meet]
     return replace(mesh, vertices=vertices)
 

@@ -2,13 +2,14 @@
 
 A crease or a tight bend looks like two sheets to a few samples, too. Two samples lie on different sheets where neither
 is on the other's tangent plane, where no sample between them lies on one sheet with both, and where their
-sheets either run side by side or one goes on past the other's plane; where most pairs of a neighbourhood do.
+sheets either run side by side or one goes on past the other's plane; where many pairs of a neighbourhood do.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
 from ..field.projection import MEMBER, TRUSTED, membership
@@ -24,6 +25,7 @@ _WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least memb
 _PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
+_WEAK, _BESIDE = 0.15, 8  # the same next to such samples, and how many are
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,12 @@ class Meetings:
 
     at      : (n,) bool
     through : float, as a share of those, the samples of sheets that pass through one another
+    beside  : float, as a share of those, the ones of them with another sheet that runs side by side with theirs
     """
 
     at: np.ndarray
     through: float
+    beside: float
 
     @property
     def share(self) -> float:
@@ -53,16 +57,36 @@ def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
     i, at = np.nonzero(unlike)
     j = nearest[i, at]
     if not len(i):
-        return Meetings(np.zeros(n, bool), 0.0)
+        return Meetings(np.zeros(n, bool), 0.0, 0.0)
     apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
     cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
     askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
     past = _goes_past(i[askew], j[askew], surface)
     apart[askew] = past > 0
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
-    at = (found >= _LEAST) & (found >= _SHARE * pairs)
-    through = np.isin(np.arange(n), np.append(i[askew], j[askew])[np.tile(past == 2, 2)])
-    return Meetings(at, float(through.sum() / max(at.sum(), 1)))
+    at = _grown(*((found >= _LEAST) & (found >= share * pairs) for share in (_SHARE, _WEAK)), nearest)
+    through = _among(n, i[askew][past == 2], j[askew][past == 2])
+    side_by_side = apart & (cosine > _SIDE_BY_SIDE)
+    beside = at & _among(n, i[side_by_side], j[side_by_side])
+    return Meetings(at, *(float(some.sum() / max(at.sum(), 1)) for some in (through, beside)))
+
+
+def _among(n, *rows):
+    """Which of n samples are among some rows, (n,) bool."""
+    found = np.zeros(n, bool)
+    found[np.concatenate(rows)] = True
+    return found
+
+
+def _grown(sure, weak, nearest):
+    """The samples marked as `weak` (n,) bool that others connect to `sure` ones, as weak edges of an image (Canny, IEEE
+    PAMI 8(6), 1986), (n,) bool; `nearest` (n,k) tells which lie next to each other."""
+    n, of = len(nearest), np.flatnonzero(weak)
+    beside = nearest[of, : 1 + _BESIDE]
+    row, column = np.nonzero(weak[beside])
+    graph = coo_matrix((np.ones(len(row), bool), (of[row], beside[row, column])), shape=(n, n))
+    part = connected_components(graph, directed=False)[1]
+    return weak & np.isin(part, part[sure])
 
 
 def _linked(i, j, nearest, alike, sure):

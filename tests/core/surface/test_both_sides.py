@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from core import InputError, Mesh, Settings, both_sides, reconstruct
+from core import Mesh, Settings, both_sides, reconstruct
 from core.surface import extract
 from core.surface.layers import HAIR
 from tests import shapes
@@ -43,6 +43,32 @@ def touching():
     """Two triangles with a vertex in common, wound alike."""
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0.0]])
     return Mesh(vertices, np.array([[0, 1, 2], [0, 3, 4]], np.int32))
+
+
+def book(pages):
+    """Pages of three quads each with their backs on the z axis, at angles in degrees, wound alike or not."""
+    turn, z = np.radians(pages), np.arange(4.0)
+    away = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    back = np.column_stack([np.zeros((4, 2)), z])
+    edges = [np.column_stack([np.tile(way, (4, 1)), z]) for way in away]
+    quads = [[(k, k + 1, at + k + 1, at + k) for k in range(3)] for at in 4 * np.arange(1, 1 + len(pages))]
+    a, b, c, d = np.concatenate(quads).T
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    faces[::3] = faces[::3, ::-1]
+    return Mesh(np.concatenate([back, *edges]), faces.astype(np.int32))
+
+
+def in_halves():
+    """An octahedron with a wall through its middle."""
+    closed = octahedron()
+    return Mesh(closed.vertices, np.concatenate([closed.faces, [[0, 1, 3], [0, 3, 4]]]).astype(np.int32))
+
+
+def finned():
+    """A patch with a triangle upright on one edge within it."""
+    flat = strip(3, 3)
+    vertices = np.concatenate([flat.vertices, [[1.5, 1, 1]]])
+    return Mesh(vertices, np.concatenate([flat.faces, [[5, 9, 16]]]).astype(np.int32))
 
 
 def octahedron():
@@ -88,6 +114,12 @@ def figure_eight(count):
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.3 * np.sin(2 * turn)], axis=1)
 
 
+def leaves(count, pages):
+    """Points on squares that meet in a line, at angles in degrees."""
+    (x, y, _), turn = shapes.square(count // len(pages)).T, np.radians(pages)
+    return np.concatenate([np.stack([(1 + x) * np.cos(a), y, (1 + x) * np.sin(a)], axis=1) for a in turn])
+
+
 SHEETS = {  # and how many pieces their covers have, of which Euler characteristic each
     "triangle": (Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32)), [2]),
     "two triangles": (strip(1, 1), [2]),
@@ -99,6 +131,10 @@ SHEETS = {  # and how many pieces their covers have, of which Euler characterist
     "a one-sided band": (band(3), [0]),
     "one of a quad's width": (band(1), [0]),
     "a closed one with one side": (projective_plane(), [2]),
+    "pages": (book([0, 90, 135]), [2]),
+    "crossed": (book([0, 90, 180, 270]), [2]),
+    "a finned patch": (finned(), [2]),
+    "two chambers": (in_halves(), [2, 2, 2]),
 }
 
 
@@ -110,7 +146,7 @@ def test_covers_any_sheet(name):
     assert [shapes.euler(piece) for piece in shapes.components(cover)] == euler
     np.testing.assert_allclose(cover.face_areas().sum(), 2 * sheet.face_areas().sum(), rtol=1e-3)
     edges, counts = sheet.edge_counts()
-    border = sheet.vertices[np.unique(edges[counts == 1])]
+    border = sheet.vertices[np.setdiff1d(edges[counts == 1], edges[counts > 2])]
     assert len(border) == 0 or KDTree(cover.vertices).query(border)[0].max() == 0
 
 
@@ -147,10 +183,46 @@ def test_faces_may_be_wound_unlike():
     assert KDTree(alike.vertices).query(cover.vertices)[0].max() < 1e-9
 
 
-def test_sheets_that_meet_are_refused():
-    faces = [[0, 1, 2], [0, 3, 1], [1, 0, 4]]
-    with pytest.raises(InputError, match="1 edges of the sheet have more than two faces"):
-        both_sides(Mesh(np.random.default_rng(0).random((5, 3)), np.array(faces, np.int32)), CELL)
+@pytest.mark.parametrize("pages", [[0, 90, 180], [200, 10, 100, 310], [0, 20, 40, 60, 80]])
+def test_sides_that_face_each_other_are_joined(pages):
+    """In the wedge between neighbouring pages lies one vertex for each inside of the line, halfway between them."""
+    sheet = book(pages)
+    cover, n = both_sides(sheet, CELL), len(pages)
+    inside = cover.vertices[np.isclose(cover.vertices[:, 2], 1, atol=CELL * HAIR)]
+    inside = inside[np.hypot(*inside.T[:2]) < CELL]
+    assert len(inside) == n
+    turn = np.sort(np.degrees(np.arctan2(inside[:, 1], inside[:, 0])) % 360)
+    ends = np.sort(pages)
+    halfway = 0.5 * (ends + np.append(ends[1:], ends[0] + 360)) % 360
+    np.testing.assert_allclose(turn, np.sort(halfway), atol=1)
+
+
+def test_a_fold_beside_a_line_is_no_other_order_of_the_sheets():
+    """Where a page is bent to the far side of the one beside it, at one vertex next to the line."""
+    sheet = book([0, 30, 180])
+    turn, z = np.radians([0, 30, 180]), np.arange(4.0)
+    edges = [np.column_stack([np.tile([3 * np.cos(a), 3 * np.sin(a)], (4, 1)), z]) for a in turn]
+    near = [[4 * page + k for k in range(4, 8)] for page in range(3)]
+    quads = [(a[k], a[k + 1], a[k + 1] + 12, a[k] + 12) for a in near for k in range(3)]
+    a, b, c, d = np.array(quads).T
+    faces = np.concatenate([sheet.faces, np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    sheet = Mesh(np.concatenate([sheet.vertices, *edges]), faces.astype(np.int32))
+    sheet.vertices[9] = np.cos(np.radians(10)), -np.sin(np.radians(10)), 1
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    assert shapes.euler(cover) == 2
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_the_sheet_the_cover_is_manifold(seed):
+    """Of triangles that share vertices at random, many of them at an edge."""
+    random = np.random.default_rng(seed)
+    faces = np.unique(np.sort([random.choice(9, 3, replace=False) for _ in range(24)], axis=1), axis=0)
+    sheet = Mesh(random.normal(size=(9, 3)), random.permuted(faces, axis=1).astype(np.int32))
+    assert (sheet.edge_counts()[1] > 2).any()
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    np.testing.assert_allclose(cover.face_areas().sum(), 2 * sheet.face_areas().sum(), rtol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -158,17 +230,20 @@ def test_sheets_that_meet_are_refused():
     [
         (shapes.torus(2000), True),
         (shapes.disc(800), True),
-        (shapes.junction(2400), False),
+        (shapes.junction(2400), True),
+        (leaves(2400, [0, 15, 180]), False),
+        (leaves(2400, [0, 120, 240]), False),
         (shapes.moebius(1500), True),
         (shapes.scattered_sphere(150), False),
         (shapes.sphere(20_000), False),
         (slab(1500), True),
         (figure_eight(3000), False),
     ],
-    ids=["torus", "disc", "junction", "moebius", "sparse", "dense", "close walls", "crossed"],
+    ids=["torus", "disc", "junction", "wedge", "Y", "moebius", "sparse", "dense", "close walls", "crossed"],
 )
-def test_a_run_covers_the_single_layer_where_sheets_do_not_meet(points, same):
-    """And is neither sparse nor dense, and does not pass through itself."""
+def test_a_run_covers_the_single_layer_where_that_is_the_whole_surface(points, same):
+    """It is neither sparse nor dense, does not pass through itself, and where sheets meet they do not run side by side
+    and samples show that they meet, which those of sheets at the same angles to each other do not."""
     run = reconstruct(points, Settings(resolution=48, surface="both"))
     assert is_of_sheet(run) == same
 
@@ -194,6 +269,9 @@ def test_a_run_leaves_a_one_sided_sheet_alone_that_touches_itself(monkeypatch):
 
 
 def is_of_sheet(run):
-    """Whether all vertices of the double cover lie within half a hair of those of the single layer."""
-    apart = KDTree(run.sheet.vertices).query(run.surface.vertices)[0] / run.field.spacing
+    """Whether all vertices of the double cover lie within half a hair of those of the single layer, or of the middles
+    of its edges."""
+    middles = run.sheet.vertices[run.sheet.edge_counts()[0]].mean(axis=1)
+    places = np.concatenate([run.sheet.vertices, middles])
+    apart = KDTree(places).query(run.surface.vertices)[0] / run.field.spacing
     return apart.max() <= 0.5 * HAIR + 1e-9

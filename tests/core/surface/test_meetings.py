@@ -6,7 +6,7 @@ import pytest
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.meeting_edges import _least
-from core.surface.meetings import _goes_past, _linked, find_meetings
+from core.surface.meetings import _goes_past, _grown, _linked, find_meetings
 from core.surface.sheets import sheets_near
 from tests import shapes
 
@@ -83,6 +83,7 @@ def test_a_sheet_goes_past_another_where_it_has_samples_on_both_sides(turned):
     meet = find_meetings(surface)
     assert meet.at.sum() > 50
     assert meet.through < 0.05
+    assert meet.beside == 0
 
 
 def test_crossing_squares_meet_along_their_line_only():
@@ -96,6 +97,19 @@ def test_crossing_squares_meet_along_their_line_only():
     assert meet.through > 0.25
 
 
+def test_weak_marks_count_where_others_lead_to_a_sure_one():
+    """Along a row of samples, each beside the four next to it."""
+    n = 60
+    nearest = (np.arange(n)[:, None] + [0, -1, 1, -2, 2]) % n
+    sure, weak = np.zeros(n, bool), np.zeros(n, bool)
+    sure[10], weak[5:20] = True, True
+    weak[[22, 23]], weak[30:40] = True, True  # two steps on, and too far
+    weak[12] = weak[15] = False
+    expected = weak & (np.arange(n) < 20)
+    np.testing.assert_array_equal(_grown(sure, weak, nearest), expected)
+    assert not _grown(np.zeros(n, bool), weak, nearest).any()
+
+
 def test_sheets_side_by_side_meet():
     """At .7 spacings, seen by samples beyond the nearest few."""
     points = shapes.sheets(2400, gap=0.04)
@@ -105,6 +119,7 @@ def test_sheets_side_by_side_meet():
     meet = find_meetings(surface)
     assert meet.at[inner].mean() > 0.95
     assert meet.through == 0
+    assert meet.beside > 0.95
 
 
 def test_a_node_near_a_crossing_knows_both_sheets():
