@@ -66,12 +66,13 @@ def _sides(sheet):
     following, last = np.roll(order, -1), np.cumsum(count) - 1
     following[last] = order[last - count + 1]
     ahead, back = corners * ~upwards[order], corners * upwards[following]
-    links = (ends[:, order] + ahead).reshape(-1), (ends[:, following] + back).reshape(-1)
-    graph = coo_matrix((np.ones(2 * corners, bool), links), shape=(2 * corners,) * 2)
+    one, other = ends[:, order] + ahead, ends[:, following] + back
+    links = np.ones(one.size, bool), (one.reshape(-1), other.reshape(-1))
+    graph = coo_matrix(links, shape=(2 * corners,) * 2)
     n, vertex = connected_components(graph, directed=False)
     met = vertex[:corners] == vertex[corners:]
     row = np.flatnonzero((several > 2) | ((several == 2) & (met & met[after])[order]))
-    row = row[_alike(edge[order[row]], *vertex[(ends[:, order] + ahead)[:, row]])]
+    row = row[_alike(edge[order[row]], *vertex[one[:, row]])]
     middle = np.full(2 * corners, -1, sheet.faces.dtype)
     middle[order[row] + ahead[row]] = middle[following[row] + back[row]] = n + np.arange(len(row))
     shape = 2, *sheet.faces.shape
