@@ -3,8 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..linalg import cross, dots, lengths, symmetric
 from .layers import HAIR
@@ -51,7 +49,8 @@ class _Sides:
 
 def _sides(sheet):
     """Around each edge its faces are in order of their angles, and the side of each that faces ahead is joined to the
-    side of the next one that faces back; of a face alone, both its sides."""
+    side of the next one that faces back; of a face alone, both its sides. So the sides around a vertex follow each
+    other in cycles: from low end to low end one way, from high end to high end the other."""
     corner, corners = sheet.faces.reshape(-1), sheet.faces.size
     edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
     edge = edge.reshape(-1)
@@ -67,16 +66,28 @@ def _sides(sheet):
     following[last] = order[last - count + 1]
     ahead, back = corners * ~upwards[order], corners * upwards[following]
     one, other = ends[:, order] + ahead, ends[:, following] + back
-    links = np.ones(one.size, bool), (one.reshape(-1), other.reshape(-1))
-    graph = coo_matrix(links, shape=(2 * corners,) * 2)
-    n, vertex = connected_components(graph, directed=False)
+    around = np.empty(2 * corners, sheet.faces.dtype)
+    around[one[0]], around[other[1]] = other[0], one[1]
+    n, vertex = _cycles(around)
     met = vertex[:corners] == vertex[corners:]
     row = np.flatnonzero((several > 2) | ((several == 2) & (met & met[after])[order]))
     row = row[_alike(edge[order[row]], *vertex[one[:, row]])]
     middle = np.full(2 * corners, -1, sheet.faces.dtype)
     middle[order[row] + ahead[row]] = middle[following[row] + back[row]] = n + np.arange(len(row))
     shape = 2, *sheet.faces.shape
-    return _Sides(vertex.astype(middle.dtype).reshape(shape), middle.reshape(shape), corner[ends[:, order[row]]])
+    return _Sides(vertex.reshape(shape), middle.reshape(shape), corner[ends[:, order[row]]])
+
+
+def _cycles(after):
+    """How many cycles a permutation (m,) has, and the number of that of each element, (m,), in order of the first ones:
+    these are found over 2, 4, 8 ... elements ahead."""
+    each = np.arange(len(after), dtype=after.dtype)
+    first, least = each, np.minimum(each, after)
+    while (least != first).any():
+        first, after = least, after.take(after)
+        least = np.minimum(first, first.take(after))
+    number = np.cumsum(first == each, dtype=after.dtype) - 1
+    return int(number[-1]) + 1 if len(number) else 0, number.take(first)
 
 
 def _after(corner):
@@ -111,11 +122,11 @@ def _angles(sheet, low, high, third):
 
 def _totals(x, sides, n):
     """Sums of x (f,) over the sides that each of n vertices has, less over the backs, (n,)."""
-    found = np.zeros(n)
-    for at in (sides.vertex, sides.middle):
-        front, back = (np.bincount(of.reshape(-1) + 1, np.repeat(x, 3), n + 1)[1:] for of in at)
-        found += front - back
-    return found
+    x = np.repeat(x, 3)
+    front, back = (np.bincount(of.reshape(-1), x, n) for of in sides.vertex)
+    cut = [np.flatnonzero(of.reshape(-1) >= 0) for of in sides.middle]
+    ahead, behind = (np.bincount(of.reshape(-1)[at], x[at], n) for of, at in zip(sides.middle, cut, strict=True))
+    return (front - back) + (ahead - behind)
 
 
 def _joined(vertices, sides, pairs):
