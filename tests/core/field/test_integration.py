@@ -6,9 +6,9 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Cancelled, Settings, reconstruct
-from core.field.feet import Feet, settled_feet
-from core.field.grid import Grid, fit_grid
-from core.field.integration import _Held, distance_field
+from core.field.feet import settled_feet
+from core.field.grid import fit_grid
+from core.field.integration import distance_field
 from core.field.local_surface import fit_local_surface
 from core.field.projection import FROM_NODES
 from core.points import local_spacing
@@ -187,25 +187,3 @@ def test_poisson_agrees_with_transport(points):
     assert np.percentile(apart, 95) < 1.0
     near = run.field.values < run.field.spacing
     assert np.mean(run.field.values[near] == other.field.values[near]) > 0.998  # but where feet close a crack
-
-
-def test_nodes_take_the_closest_foot_of_their_own_and_their_neighbours(random):
-    """Against the distances to all seven, at the sides of the box, too, and in slabs of any thickness."""
-    shape, feet = (5, 4, 6), 40
-    grid = Grid(np.array([-0.3, 0.1, 0.7]), 0.25, shape)
-    place = (grid.origin + random.uniform(0, 1, (feet, 3))).astype(np.float32)
-    before = random.integers(0, feet, shape).astype(np.int32)
-    held, row = _Held.beyond_all(shape), np.empty(shape, np.int32)
-    slabs = [slice(0, 2), slice(2, 3), slice(3, 5)]
-    for slab in slabs:
-        held.measure(grid, Feet(place.T, place.T, np.zeros(feet, np.float32)), before, slab)
-    for slab in slabs:
-        held.take_closest(np.float32(grid.spacing), row, slab)
-    node = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
-    steps = np.concatenate([np.zeros((1, 3), int), np.eye(3, dtype=int), -np.eye(3, dtype=int)])
-    there = np.clip(node[..., None, :] + steps, 0, np.array(shape) - 1)
-    offered = place[before[tuple(np.moveaxis(there, -1, 0))]]
-    x = grid.origin + grid.spacing * node
-    least = np.linalg.norm(x[..., None, :] - offered, axis=-1).min(axis=-1)
-    np.testing.assert_allclose(np.linalg.norm(x - place[row], axis=-1), least, atol=1e-6)
-    assert (row != before).mean() > 0.3
