@@ -56,7 +56,8 @@ class Feet:
         return found
 
     def closest(self, x: np.ndarray, among: np.ndarray) -> np.ndarray:
-        """Which of the feet `among` (c,m) is the closest to each x (3,m) float32: their numbers (m,)."""
+        """Which of the feet `among` (c,...) is the closest to each x (3,...) float32, the first of several: their
+        numbers (...)."""
         row, offset = among[0], self.offsets(x, among[0])
         least = dots(offset, offset)
         for other in among[1:]:
@@ -73,8 +74,8 @@ class Feet:
 
 
 def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, progress) -> tuple[np.ndarray, Feet]:
-    """Nodes close to the surface whose foot points are on it, (s,) of `node` (b,), and those feet: after a second
-    projection, but where all patches agreed on the first.
+    """Nodes close to the surface, but not on it, whose foot points are on it, (s,) of `node` (b,), and those feet:
+    after a second projection, but where all patches agreed on the first.
 
     near : where the nodes fall on the surface
     """

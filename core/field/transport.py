@@ -99,16 +99,8 @@ def _climb(blocks, feet, beside, row, slab):
     """Put into `row` of a slab of blocks feet of the nodes `beside` those whose feet they have, where these are closer,
     a few times."""
     x, best = _positions(blocks, slab), row[slab]
-    offset = feet.offsets(x, best)
-    least = dots(offset, offset)
     for _ in range(_STEPS):
-        start = best
-        for others in beside:
-            other = others.take(start)
-            offset = feet.offsets(x, other)
-            squared = dots(offset, offset)
-            best = np.where(squared < least, other, best)
-            least = np.minimum(squared, least)
+        best = feet.closest(x, [best, *(others.take(best) for others in beside)])
     row[slab] = best
 
 
@@ -148,14 +140,12 @@ class _Held:
         limit = np.float32((_NEAR * grid.spacing) ** 2)
         at = np.nonzero(self.squared[slab.start + 1 : slab.stop + 1, :-1, :-1] <= limit)
         x, own = [along.take(i) for along, i in zip(_axes(grid, slab), at, strict=True)], row[slab][at]
-        offset, normal = feet.offsets(x, own), [each.take(own) for each in feet.normals]
-        height = dots(offset, normal)
+        normal = [each.take(own) for each in feet.normals]
+        height = dots(feet.offsets(x, own), normal)
         cells = [(x[a] - height * normal[a] - np.float32(grid.origin[a])) / np.float32(grid.spacing) for a in range(3)]
         below = [np.rint(each).clip(0, n - 1).astype(np.int32) for each, n in zip(cells, grid.shape, strict=True)]
         other = number[tuple(below)]
-        other = np.where(other >= 0, other, own)
-        there = feet.offsets(x, other)
-        row[slab][at] = np.where(dots(there, there) < dots(offset, offset), other, own)
+        row[slab][at] = feet.closest(x, [own, np.where(other >= 0, other, own)])
 
     def take_closest(self, cell, row, slab):
         """Put into `row` the feet of neighbours that are closer to the nodes of a slab than their own. One cell h on
