@@ -91,6 +91,13 @@ def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+def quadratic_form(tensor: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """v T v, for six and three components (...) each that broadcast."""
+    xx, yy, zz, xy, xz, yz = tensor
+    x, y, z = v
+    return x * (xx * x + 2 * (xy * y + xz * z)) + y * (yy * y + 2 * yz * z) + zz * z * z
+
+
 def row_dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Inner products along the last axis of arrays (...,k) that broadcast, (...)."""
     return np.einsum("...k,...k->...", a, b)

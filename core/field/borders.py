@@ -72,23 +72,27 @@ class Rims:
         return np.maximum(self.reach, self.behind)
 
 
-def find_rims(points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:
+def find_rims(
+    points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, bend=None, progress=None
+) -> Rims:
     """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.
 
     points, normals : (n,3) float64     frames : (n,2,3) tangents     spacing : (n,) local spacing
     neighbours      : (n,k) int, nearest first       tree : of the points
     bridge          : gaps up to this many local spacings are crossed
+    bend            : (n,3,3) float64, second fundamental forms of the patches, which may bend towards each other over a
+                      gap; None for flat ones
     """
 
     def find(part):
-        return _find_rims(part, points, normals, frames[part], spacing, neighbours, tree, bridge)
+        return _find_rims(part, points, normals, frames[part], spacing, neighbours, tree, bridge, bend)
 
     chunks = Progress.of(progress).chunks(len(points), rows_at_a_time(bridge, len(points)))
     found = [rims for _, rims in in_order(find, chunks)]
     return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
 
 
-def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge):
+def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge, bend):
     cloud = points, normals, spacing, neighbours
     spacing, neighbours = spacing[part], neighbours[part]
     n, k = neighbours.shape
@@ -119,7 +123,8 @@ def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge)
     gap = (width > GAP) & (count > 0)
     distance = np.full(n, np.inf)
     rows = np.flatnonzero(gap)
-    distance[rows], other = across_gaps(part.start + rows, outward[rows], spacing[rows], points, normals, tree, bridge)
+    ahead = part.start + rows, outward[rows], spacing[rows]
+    distance[rows], other = across_gaps(*ahead, points, normals, tree, bridge, bend=bend)
     bridged = np.isfinite(distance)
     rows, other = rows[bridged[rows]], other[bridged[rows]]
     bridged[rows] = ~walled(part.start + rows, other, *cloud)
@@ -139,6 +144,13 @@ def one_sheet(step, normals, other_normals) -> np.ndarray:
 def _level(step, normals, other_normals, step_up=_STEP):
     """Whether both ends of steps (...,3) are off each other's tangent plane by less than this share of their length."""
     height = np.maximum(np.abs(row_dots(step, normals)), np.abs(row_dots(step, other_normals)))
+    return height < step_up * np.linalg.norm(step, axis=-1)
+
+
+def _bent_level(step, normals, other_normals, bend, other_bend, step_up):
+    """The same for their patches, bent as second fundamental forms (...,3,3) say."""
+    sag, sag_back = (0.5 * np.einsum("...i,...ij,...j->...", step, form, step) for form in (bend, other_bend))
+    height = np.maximum(np.abs(row_dots(step, normals) - sag), np.abs(row_dots(step, other_normals) + sag_back))
     return height < step_up * np.linalg.norm(step, axis=-1)
 
 
@@ -207,17 +219,21 @@ def _within(bridge, n):
 
 
 def across_gaps(
-    rows, outward, spacing, points, normals, tree: KDTree, bridge: float, step_up=_STEP, most: int | None = None
+    rows, outward, spacing, points, normals, tree: KDTree, bridge: float, step_up=_STEP, most=None, bend=None
 ):
     """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings away
-    and off the tangent plane by less than the share `step_up` of that: its distance (m,), inf where there is none, and
-    its number (m,). Looks at the `most` nearest samples where given."""
+    and off the tangent plane, or the patch of second fundamental form `bend` (n,3,3) where given, by less than the
+    share `step_up` of that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most`
+    nearest samples where given."""
     distance, other = tree.query(points[rows], k=min(_within(bridge, len(points)), most or len(points)))
     step = points[other] - points[rows, None]
     ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
     near = (distance > 0) & (distance < bridge * spacing[:, None])
     sheet = _aligned(normals[rows, None], normals[other], 0.5)
-    sheet &= _level(step, normals[rows, None], normals[other], step_up)
+    level = _level(step, normals[rows, None], normals[other], step_up)
+    if bend is not None:
+        level |= _bent_level(step, normals[rows, None], normals[other], bend[rows, None], bend[other], step_up)
+    sheet &= level
     distance = np.where(ahead & near & sheet, distance, np.inf)
     nearest = np.arange(len(rows)), distance.argmin(axis=1)
     return distance[nearest], other[nearest]

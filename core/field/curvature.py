@@ -6,7 +6,7 @@ from ..linalg import dots, row_dots, solve_positive
 from ..parallel import work_through
 from ..progress import Progress
 
-_WIDTH = 1.5  # of the Gaussian weight, local spacings
+_WIDTH = 1.2  # of the Gaussian weight, local spacings
 _ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting
 _ALIGNED = 0.5  # least |n_i . n_j| of neighbours that count
 _STIFFNESS = 1e-3

@@ -13,15 +13,16 @@ from ..linalg import COMPONENTS, principal_axes, row_dots
 DIFFUSION_LENGTH = 0.5  # sqrt(t) in local spacings, about the paper's t = h^2
 
 
-def kernel_weights(distance, spacing, height) -> tuple[np.ndarray, np.ndarray]:
+def kernel_weights(distance, spacing, height, length=DIFFUSION_LENGTH) -> tuple[np.ndarray, np.ndarray]:
     """Area-weighted Yukawa kernels of each query's samples, up to a factor per query, and their slopes.
 
     distance : (m,k) float64, to the samples, nearest first     spacing : (m,k) local spacing there
     height   : (m,k) signed offset of the query from each sample along its normal
+    length   : sqrt(t) in local spacings of the nearest sample
     Returns the kernel (m,k) and, relative to it, its derivative along the normal (m,k), both float32. The area weight
     spacing^2 is ours: without it a dense region outvotes a sparse one.
     """
-    length = DIFFUSION_LENGTH * spacing[:, :1]
+    length = length * spacing[:, :1]
     decay = ((distance[:, :1] - distance) / length).astype(np.float32)
     inverse = (1 / distance).astype(np.float32)
     kernel = spacing.astype(np.float32) ** 2 * np.exp(decay) * inverse

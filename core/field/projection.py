@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..linalg import dots, row_dots
+from ..linalg import dots, quadratic_form, row_dots
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .diffusion import fused_axes, kernel_weights
@@ -20,7 +20,8 @@ UNCOVERED = 1.5  # the surface is never further from its nearest sample than thi
 
 _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
 _BESIDE = 0.3  # local spacings, at most, that a foot point lies off such a patch
-_MEMBERSHIP = 8.0  # how fast samples off each other's plane stop counting as one sheet
+_BLEND = 0.35  # sqrt(t) of the kernels, local spacings; with the paper's, about .5, farther patches count for too much
+_MEMBERSHIP = 7.0  # how fast samples off each other's sheet stop counting as one sheet
 _OTHER_SHEETS = 2  # at most, beside that of the nearest sample
 TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
 _STRAIGHT = 0.98  # least |n . axis| of such a sample; samples of more sheets are mixed where it is less
@@ -101,7 +102,8 @@ class Nearby:
 
     sample   : (m,k)                                     distance : (m,k) float64, ascending
     spacing  : (m,k) local spacing of the sample
-    offset   : (3,m,k) from the sample to the query      normals  : (3,m,k)
+    offset   : (3,m,k) from the sample to the query
+    normals  : (3,m,k)                                   bend     : (6,m,k) second fundamental form
     height   : (m,k) along the normal                    above    : (m,k) over the bent patch
     kernel   : (m,k) diffusion kernel                    pull     : (m,k) its slope along the normal
     beyond   : (m,k) lateral distance to the patch       outward  : (3,m,k) the step out of it
@@ -112,6 +114,7 @@ class Nearby:
     spacing: np.ndarray
     offset: np.ndarray
     normals: np.ndarray
+    bend: np.ndarray
     height: np.ndarray
     above: np.ndarray
     kernel: np.ndarray
@@ -138,14 +141,24 @@ def _project(surface, x, nearest):
     return found
 
 
-def membership(between, own, normals) -> np.ndarray:
-    """(m,k) in [0,1]: how surely samples lie on one sheet with another, from their offsets off each other's tangent
-    plane relative to their distance; keeps close sheets apart.
+def membership(between, height, height_back) -> np.ndarray:
+    """(m,k) in [0,1]: how surely samples lie on one sheet with another, from how far they are off each other's sheet
+    relative to their distance; keeps close sheets apart.
 
-    between : (3,m,k) from the one to the others     own : (3,m) its normal     normals : (3,m,k) theirs
+    between : (3,m,k) from the one to the others     height, height_back : (m,k) off its sheet and off theirs
     """
-    height, height_back = dots(between, own[:, :, None]), dots(between, normals)
-    return np.exp(-_MEMBERSHIP * (height**2 + height_back**2) / np.maximum(dots(between, between), _TINY))
+    off = _MEMBERSHIP * (height**2 + height_back**2) / np.maximum(dots(between, between), _TINY)
+    return np.exp(-(off**2))
+
+
+def _off_patches(near, anchor, between):
+    """How far samples with steps (3,m,k) from the one number `anchor` (m,) are off its patch, and it off theirs, (m,k).
+    Off tangent planes, sparse samples of a curved sheet would not count as one, and feet would jump from one nearest
+    sample to the next."""
+    every = np.arange(len(anchor))
+    own, own_bend = near.normals[:, every, anchor], near.bend[:, every, anchor]
+    height = dots(between, own[:, :, None]) - 0.5 * quadratic_form(own_bend[:, :, None], between)
+    return height, dots(between, near.normals) + 0.5 * quadratic_form(near.bend, between)
 
 
 def _nearby(surface, x, nearest):
@@ -162,12 +175,13 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     normals = np.stack([axis.take(sample) for axis in columns.normals])
     height = dots(offset, normals)
     lateral = offset - height * normals
-    xx, yy, zz, xy, xz, yz = (bend.take(sample) for bend in columns.bend)
+    bend = np.stack([component.take(sample) for component in columns.bend])
+    xx, yy, zz, xy, xz, yz = bend
     bent = np.stack([dots(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
     above = (height - 0.5 * dots(lateral, bent)) / np.sqrt(1 + dots(bent, bent))
-    kernel, pull = kernel_weights(distance, spacing, height)
+    kernel, pull = kernel_weights(distance, spacing, height, _BLEND)
     patch = surface.patches.excess(sample, lateral, spacing)
-    return Nearby(sample, distance, spacing, offset, normals, height, above, kernel, pull, *patch)
+    return Nearby(sample, distance, spacing, offset, normals, bend, height, above, kernel, pull, *patch)
 
 
 def _onto_sheet(surface, near, anchor):
@@ -197,7 +211,7 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     """Where queries fall on the sheet of their sample number `anchor` (m,)."""
     every = np.arange(len(near.sample))
     between = near.offset[:, every, anchor][:, :, None] - near.offset
-    member = membership(between, near.normals[:, every, anchor], near.normals)
+    member = membership(between, *_off_patches(near, anchor, between))
     weight = near.kernel * member
     weight /= np.einsum("mk->m", weight)[:, None]
     axis = fused_axes(weight, near.pull, near.normals)

@@ -18,7 +18,7 @@ from .isosurface import need_quads
 from .meetings import Meetings, find_meetings
 from .mesh import Mesh
 from .misfit import misfit
-from .pieces import without_small_pieces
+from .pieces import pieces_touch, without_small_pieces
 from .sides import Sides, find_sides, may_be_closed, needed_band
 from .signed import signed_distance, signed_mesh
 from .single_layer import sheet_of_crossings, sheet_of_sides
@@ -132,14 +132,15 @@ class _Layers:
 
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
-        surface, and where sheets meet if its lines are where samples show that, none of them side by side."""
+        surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
+        by side."""
         if self.sheet is not None:
             return True
         sheet, meetings = self.single[0], self.meetings
         edges, count = sheet.edge_counts()
         line = np.unique(edges[count > 2])
         if not len(line):
-            return not self.crossings.normal.any()
+            return not self.crossings.normal.any() and not pieces_touch(sheet, self.grid.spacing)
         sample = self.local.tree.query(sheet.vertices[line])[1]
         return meetings.beside <= _BESIDE and meetings.at[sample].mean() >= _SEEN
 

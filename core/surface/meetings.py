@@ -136,7 +136,8 @@ def _members(surface, own, k, progress):
         near = surface.tree.query(surface.points[own[part]], k=k)[1]
         points, normals = surface.columns.points, surface.normals.T
         between = np.stack([x.take(near) - x.take(own[part])[:, None] for x in points])
-        return near, membership(between, surface.normals[own[part]].T, np.stack([n.take(near) for n in normals]))
+        own_normals, theirs = normals[:, own[part], None], np.stack([column.take(near) for column in normals])
+        return near, membership(between, dots(between, own_normals), dots(between, theirs))
 
     for part, found in in_order(look, even_chunks(len(own), _CHUNK, progress)):
         nearest[part], member[part] = found

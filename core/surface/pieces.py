@@ -12,6 +12,7 @@ from .mesh import Mesh
 _SAMPLE_AT = 1.5  # cells
 _FEW, _MANY = 8, 80  # samples
 _TINY = 24  # faces
+_BESIDE = 24  # vertices around one on a border, about as many as there are within a cell
 _LARGE, _EVERY = 10_000, 4  # vertices of a piece from which on every fourth is asked for its sample
 
 
@@ -50,6 +51,19 @@ def without_small_pieces(mesh: Mesh, share: float) -> tuple[Mesh, int]:
 def piece_count(mesh: Mesh) -> int:
     """Number of connected pieces, of a mesh all of whose vertices are in use."""
     return _pieces(mesh)[0]
+
+
+def pieces_touch(mesh: Mesh, reach: float) -> bool:
+    """Whether a piece ends within `reach` of another one."""
+    count, piece = _pieces(mesh)
+    if count == 1:
+        return False
+    edges, faces = mesh.edge_counts()
+    border = np.unique(edges[faces == 1])
+    tree = KDTree(mesh.vertices)
+    near = tree.query(mesh.vertices[border], k=_BESIDE, distance_upper_bound=reach, workers=-1)[1]
+    piece = np.append(piece, -1)
+    return bool(((near < tree.n) & (piece[near] != piece[border, None])).any())
 
 
 def _pieces(mesh):

@@ -34,6 +34,22 @@ def test_the_rim_of_a_disc_is_found_and_nothing_else():
     assert outward[rim].min() > 0.8
 
 
+def test_a_gap_that_patches_bend_over_is_bridged():
+    """Along a slot in a tube, whose far side is off the tangent planes."""
+    points = shapes.cylinder(300)
+    points = points[np.abs(np.arctan2(points[:, 1], points[:, 0])) > np.radians(25)]
+    normals = points * [1, 1, 0]
+    tangent = np.stack([-normals[:, 1], normals[:, 0], np.zeros(len(points))], axis=1)
+    bend = -np.einsum("ni,nj->nij", tangent, tangent)
+    spacing, tree = local_spacing(points), KDTree(points)
+    given = points, normals, tangent_frames(normals), spacing, patch_neighbours(tree), tree, 5.0
+    beside = (points[:, 0] > 0.4) & (np.abs(points[:, 2]) < 0.6)
+    flat, bent = (find_rims(*given, bend=form) for form in (None, bend))
+    assert (flat.gap & beside).any()
+    np.testing.assert_array_equal(open_rim(flat)[beside], flat.gap[beside])
+    assert not open_rim(bent)[beside].any()
+
+
 @pytest.mark.parametrize("points", [shapes.sphere(500), shapes.sphere(3000)])
 def test_a_closed_surface_has_none(points):
     rims, _ = rims_of(points, points)

@@ -4,7 +4,7 @@ from scipy.spatial import KDTree
 
 from core import Cancelled
 from core.field.local_surface import fit_local_surface
-from core.field.projection import CHUNK
+from core.field.projection import CHUNK, MEMBER, membership
 from core.points import local_spacing
 from tests import shapes
 
@@ -39,6 +39,26 @@ def test_distance_and_foot_are_those_of_the_closed_form(points, normals, true, r
     assert error.max() < 0.6
     np.testing.assert_allclose(np.linalg.norm(found.step, axis=1), found.distance, atol=1e-9)
     assert np.percentile(true(x - found.step), 95) < 0.05 * spacing
+
+
+@pytest.mark.parametrize(("n", "most"), [(100, 0.01), (300, 0.002)])
+def test_where_samples_of_a_curved_sheet_are_few_feet_do_not_jump(n, most):
+    """From the cell of one nearest sample to the next."""
+    points = shapes.torus(n)
+    ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
+    surface = fit(points, (points - ring) / 0.4)
+    i, j = KDTree(points).query_pairs(0.9 * np.median(surface.spacing), output_type="ndarray").T
+    halfway, way = 0.5 * (points[i] + points[j]), points[j] - points[i]
+    here, there = (surface.project(halfway + side * way) for side in (-1e-6, 1e-6))
+    jump = np.linalg.norm(here.step - there.step, axis=1) / np.median(surface.spacing)
+    assert np.percentile(jump, 90) < most
+
+
+def test_the_more_off_each_others_sheets_for_their_distance_the_less_samples_are_of_one():
+    between = np.array([[1.0, 1.0, 2.0, 1.0], [0, 0, 0, 0], [0, 0, 0, 0]])[:, None]
+    member = membership(between, np.array([[0.0, 0.2, 0.4, 0.4]]), np.array([[0.0, 0.2, -0.4, 0.4]]))[0]
+    assert member[0] == 1
+    assert member[1] == member[2] > MEMBER > member[3] > 0
 
 
 @pytest.mark.parametrize(("points", "normals", "true"), SHAPES.values(), ids=SHAPES.keys())

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Mesh, Settings, reconstruct
-from core.surface.pieces import piece_count, pieces_with_samples, without_small_pieces
+from core.surface.pieces import piece_count, pieces_touch, pieces_with_samples, without_small_pieces
 from tests import shapes
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
@@ -29,6 +29,15 @@ def test_one_sample_holds_a_whole_piece_and_vertices_are_renumbered():
     np.testing.assert_array_equal(mesh.vertices, strip.vertices[3:])
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [2, 1, 3]])
     assert mesh.faces.dtype == np.int32
+
+
+@pytest.mark.parametrize(("gap", "touch"), [(0.9, True), (1.1, False)])
+def test_pieces_touch_where_one_ends_beside_another(gap, touch):
+    assert pieces_touch(triangles([0, 0, 0], [0, 0, gap]), 1.0) == touch
+
+
+def test_one_piece_touches_no_other():
+    assert not pieces_touch(triangles([0, 0, 0]), 9.0)
 
 
 def test_nothing_left():
