@@ -112,7 +112,7 @@ def ball(tmp_path_factory):
 
 @pytest.mark.parametrize("name", PEERS)
 def test_a_peer_meshes_a_sphere(name, ball):
-    pytest.importorskip(PEERS[name].module)
+    pytest.importorskip(PEERS[name].module, exc_type=ImportError)
     found = measure_peers([name], ball, "uniform", 2)[name]
     assert found["cd"] < 5
     assert found["nc"] > 0.95
@@ -173,7 +173,7 @@ def test_times_alone_add_up():
 
 
 def test_both_ways_are_timed_alone(ball):
-    pytest.importorskip("open3d")
+    pytest.importorskip("open3d", exc_type=ImportError)
     found = time_alone(ball, "uniform", Settings(resolution=32), 2)
     assert found["points"] == 800
     assert all(found[way][key] > 0 for way in ("ours", "poisson") for key in ("seconds", "cpu"))

@@ -10,7 +10,7 @@ from benchmarks.layers import PERCENTILES, gaps, layers_of, main, write_page
 from core import Mesh
 from tests import shapes
 
-pytest.importorskip("open3d")
+pytest.importorskip("open3d", exc_type=ImportError)
 
 CELL = 0.2
 

@@ -50,6 +50,6 @@ def test_growth_and_targets_are_read_from_runs_that_are_made():
 
 
 def test_a_folder_without_the_case_is_refused(tmp_path, capsys):
-    pytest.importorskip("open3d")
+    pytest.importorskip("open3d", exc_type=ImportError)
     assert scale.main([str(tmp_path)]) == 2
     assert "holds no .npz case" in capsys.readouterr().err
