@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
+from .curvature import sag
 from .walls import walled
 
 GAP = np.radians(130)
@@ -72,27 +73,24 @@ class Rims:
         return np.maximum(self.reach, self.behind)
 
 
-def find_rims(
-    points, normals, frames, spacing, neighbours, tree: KDTree, bridge: float, bend=None, progress=None
-) -> Rims:
+def find_rims(points, normals, frames, bend, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:
     """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.
 
     points, normals : (n,3) float64     frames : (n,2,3) tangents     spacing : (n,) local spacing
+    bend            : (n,3,3) float64 of the patches, which may bend towards each other over a gap
     neighbours      : (n,k) int, nearest first       tree : of the points
     bridge          : gaps up to this many local spacings are crossed
-    bend            : (n,3,3) float64, second fundamental forms of the patches, which may bend towards each other over a
-                      gap; None for flat ones
     """
 
     def find(part):
-        return _find_rims(part, points, normals, frames[part], spacing, neighbours, tree, bridge, bend)
+        return _find_rims(part, points, normals, frames[part], bend, spacing, neighbours, tree, bridge)
 
     chunks = Progress.of(progress).chunks(len(points), rows_at_a_time(bridge, len(points)))
     found = [rims for _, rims in in_order(find, chunks)]
     return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
 
 
-def _find_rims(part, points, normals, frames, spacing, neighbours, tree, bridge, bend):
+def _find_rims(part, points, normals, frames, bend, spacing, neighbours, tree, bridge):
     cloud = points, normals, spacing, neighbours
     spacing, neighbours = spacing[part], neighbours[part]
     n, k = neighbours.shape
@@ -141,17 +139,12 @@ def one_sheet(step, normals, other_normals) -> np.ndarray:
     return _level(step, normals, other_normals) & _aligned(normals, other_normals, _FLAT)
 
 
-def _level(step, normals, other_normals, step_up=_STEP):
-    """Whether both ends of steps (...,3) are off each other's tangent plane by less than this share of their length."""
-    height = np.maximum(np.abs(row_dots(step, normals)), np.abs(row_dots(step, other_normals)))
-    return height < step_up * np.linalg.norm(step, axis=-1)
-
-
-def _bent_level(step, normals, other_normals, bend, other_bend, step_up):
-    """The same for their patches, bent as second fundamental forms (...,3,3) say."""
-    sag, sag_back = (0.5 * np.einsum("...i,...ij,...j->...", step, form, step) for form in (bend, other_bend))
-    height = np.maximum(np.abs(row_dots(step, normals) - sag), np.abs(row_dots(step, other_normals) + sag_back))
-    return height < step_up * np.linalg.norm(step, axis=-1)
+def _level(step, normals, other_normals, step_up=_STEP, above=0.0, above_back=0.0):
+    """Whether both ends of steps (...,3) are off each other's tangent plane, or what lies so far above it there (...),
+    by less than this share of their length."""
+    height = np.abs(row_dots(step, normals) - above)
+    height_back = np.abs(row_dots(step, other_normals) + above_back)
+    return np.maximum(height, height_back) < step_up * np.linalg.norm(step, axis=-1)
 
 
 def _aligned(normals, other_normals, least):
@@ -222,17 +215,18 @@ def across_gaps(
     rows, outward, spacing, points, normals, tree: KDTree, bridge: float, step_up=_STEP, most=None, bend=None
 ):
     """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings away
-    and off the tangent plane, or the patch of second fundamental form `bend` (n,3,3) where given, by less than the
-    share `step_up` of that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most`
-    nearest samples where given."""
+    and off the tangent plane, or the patch that `bend` (n,3,3) says where given, by less than the share `step_up` of
+    that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most` nearest samples where
+    given."""
     distance, other = tree.query(points[rows], k=min(_within(bridge, len(points)), most or len(points)))
     step = points[other] - points[rows, None]
     ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
     near = (distance > 0) & (distance < bridge * spacing[:, None])
     sheet = _aligned(normals[rows, None], normals[other], 0.5)
-    level = _level(step, normals[rows, None], normals[other], step_up)
+    ends = step, normals[rows, None], normals[other], step_up
+    level = _level(*ends)
     if bend is not None:
-        level |= _bent_level(step, normals[rows, None], normals[other], bend[rows, None], bend[other], step_up)
+        level |= _level(*ends, sag(step, bend[rows, None]), sag(step, bend[other]))
     sheet &= level
     distance = np.where(ahead & near & sheet, distance, np.inf)
     nearest = np.arange(len(rows)), distance.argmin(axis=1)

@@ -39,6 +39,12 @@ def bending(points, normals, frames, spacing, neighbours, progress=None) -> np.n
     return bend
 
 
+def sag(step: np.ndarray, bend: np.ndarray) -> np.ndarray:
+    """Height above the tangent plane, (...), of patches with second fundamental forms (...,3,3) at steps (...,3) from
+    their samples, whose part along the normal does not count."""
+    return 0.5 * np.einsum("...i,...ij,...j->...", step, bend, step)
+
+
 def _bending(points, normals, rows, frames, spacing, neighbours):
     """Points and normals component by component, (3,n)."""
     step = [column.take(neighbours) - column[rows, None] for column in points]

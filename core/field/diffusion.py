@@ -18,7 +18,7 @@ def kernel_weights(distance, spacing, height, length=DIFFUSION_LENGTH) -> tuple[
 
     distance : (m,k) float64, to the samples, nearest first     spacing : (m,k) local spacing there
     height   : (m,k) signed offset of the query from each sample along its normal
-    length   : sqrt(t) in local spacings of the nearest sample
+    length   : sqrt(t) in local spacings of the nearest sample, about the paper's where not given
     Returns the kernel (m,k) and, relative to it, its derivative along the normal (m,k), both float32. The area weight
     spacing^2 is ours: without it a dense region outvotes a sparse one.
     """

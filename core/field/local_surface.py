@@ -90,7 +90,7 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     frames = tangent_frames(normals)
     neighbours = patch_neighbours(tree, progress.part(0.0, 0.1))
     bend = bending(points, normals, frames, spacing, neighbours, progress.part(0.1, 0.5))
-    rims = find_rims(points, normals, frames, spacing, neighbours, tree, bridge, bend, progress.part(0.5, 0.84))
+    rims = find_rims(points, normals, frames, bend, spacing, neighbours, tree, bridge, progress.part(0.5, 0.84))
     rims = with_openings_kept(rims, points, normals, spacing, neighbours, tree, bridge, progress.part(0.84, 0.86))
     part = progress.part(0.86, 0.87)
     rims = with_sparser_parts_joined(rims, points, normals, spacing, neighbours, tree, bridge, part)

@@ -22,6 +22,7 @@ from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
+from .curvature import sag
 from .walls import walled
 
 _FEW = 4  # samples in a row that a wide gap in the sampling may have at its rim
@@ -162,5 +163,4 @@ def _foot(x, points, normals, bend):
     """Where the patches of points (m,3) lie below or above x (m,3)."""
     offset = x - points
     lateral = offset - row_dots(offset, normals)[:, None] * normals
-    height = 0.5 * np.einsum("mi,mij,mj->m", lateral, bend, lateral)
-    return points + lateral + height[:, None] * normals
+    return points + lateral + sag(lateral, bend)[:, None] * normals

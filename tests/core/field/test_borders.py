@@ -16,7 +16,8 @@ def rims_of(points, normals, bridge=3.0):
     normals = np.broadcast_to(normals, points.shape)
     spacing = local_spacing(points)
     tree = KDTree(points)
-    return find_rims(points, normals, tangent_frames(normals), spacing, patch_neighbours(tree), tree, bridge), spacing
+    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
+    return find_rims(points, normals, frames, flat, spacing, patch_neighbours(tree), tree, bridge), spacing
 
 
 def open_rim(rims):
@@ -42,9 +43,9 @@ def test_a_gap_that_patches_bend_over_is_bridged():
     tangent = np.stack([-normals[:, 1], normals[:, 0], np.zeros(len(points))], axis=1)
     bend = -np.einsum("ni,nj->nij", tangent, tangent)
     spacing, tree = local_spacing(points), KDTree(points)
-    given = points, normals, tangent_frames(normals), spacing, patch_neighbours(tree), tree, 5.0
+    frames, given = tangent_frames(normals), (spacing, patch_neighbours(tree), tree, 5.0)
     beside = (points[:, 0] > 0.4) & (np.abs(points[:, 2]) < 0.6)
-    flat, bent = (find_rims(*given, bend=form) for form in (None, bend))
+    flat, bent = (find_rims(points, normals, frames, form, *given) for form in (0 * bend, bend))
     assert (flat.gap & beside).any()
     np.testing.assert_array_equal(open_rim(flat)[beside], flat.gap[beside])
     assert not open_rim(bent)[beside].any()

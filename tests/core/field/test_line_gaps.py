@@ -20,7 +20,8 @@ PLACES = np.arange(12) * APART
 def before_and_after(points, normals=UP):
     normals = np.broadcast_to(normals, points.shape)
     spacing, tree = local_spacing(points), KDTree(points)
-    rims = find_rims(points, normals, tangent_frames(normals), spacing, patch_neighbours(tree), tree, 3.0)
+    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
+    rims = find_rims(points, normals, frames, flat, spacing, patch_neighbours(tree), tree, 3.0)
     return rims, with_line_gaps_bridged(rims, points, normals, spacing, tree, 3.0), spacing
 
 

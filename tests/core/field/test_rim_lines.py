@@ -20,7 +20,8 @@ def flat(points):
 def rims_of(points, normals, spacing):
     """Without lines and with them."""
     tree = KDTree(points)
-    rims = find_rims(points, normals, tangent_frames(normals), spacing, patch_neighbours(tree), tree, 3.0)
+    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
+    rims = find_rims(points, normals, frames, flat, spacing, patch_neighbours(tree), tree, 3.0)
     return rims, with_rim_lines(rims, points, normals, spacing, tree)
 
 

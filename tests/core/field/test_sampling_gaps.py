@@ -18,7 +18,8 @@ def rims_of(points, normals):
     normals = np.broadcast_to(normals, points.shape)
     spacing, tree = local_spacing(points), KDTree(points)
     neighbours = patch_neighbours(tree)
-    rims = find_rims(points, normals, tangent_frames(normals), spacing, neighbours, tree, 3.0)
+    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
+    rims = find_rims(points, normals, frames, flat, spacing, neighbours, tree, 3.0)
     return rims, normals, spacing, neighbours, tree
 
 
