@@ -17,18 +17,19 @@ from .double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
 from .isosurface import need_quads
 from .meetings import Meetings, find_meetings
 from .mesh import Mesh
-from .misfit import misfit
+from .misfit import askew, distances
 from .pieces import pieces_touch, without_small_pieces
 from .sides import Sides, find_sides, may_be_closed, needed_band
 from .signed import signed_distance, signed_mesh
 from .single_layer import sheet_of_crossings, sheet_of_sides
 
 _TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
-_BETTER = 0.5  # times that distance, below which it is taken
+_ASKEW = 0.1  # of the area of a single layer, the same where faces are turned away from the samples
+_BETTER = 0.5  # times that misfit, below which the double cover is taken
+_OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples that are, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _THROUGH = 0.125  # of those, at least: sheets that pass through each other
-_BESIDE = 0.05  # of those, at most, beside sheets so close that single layers are torn
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
 
 
@@ -100,22 +101,41 @@ class _Layers:
         if self.sheet is not None:
             return self.sheet, 0
         part = self.progress.part(0.5, 0.7, "single layer")
-        return sheet_of_crossings(self.values, self.band, self.crossings, self.local, self.grid, part)
+        given = self.values, self.band, self.crossings, self.local, self.grid
+        return sheet_of_crossings(*given, lambda: self.extracted, part)
 
     @cached_property
-    def off(self) -> float:
-        """How far samples are from the single layer on average; 0 where that bounds the inside."""
-        return 0.0 if self.sides.complete else misfit(self.single[0], self.local.points)
+    def off(self) -> np.ndarray:
+        """Distances of samples to the single layer, in cells; 0 where that bounds the inside."""
+        return np.zeros(1) if self.sides.complete else self._off(self.single[0])
+
+    def _off(self, mesh):
+        return distances(mesh, self.local.points) / self.grid.spacing
+
+    @cached_property
+    def misfit(self) -> float:
+        """Beyond 1 the single layer is torn."""
+        return 0.0 if self.sides.complete else self._misfit(self.single[0], self.off)
+
+    def _misfit(self, mesh, off):
+        """How far samples are off a mesh, or how much of it is turned away from them, whichever is worse."""
+        return max(off.mean() / _TORN, askew(mesh, self.local.tree, self.local.normals) / _ASKEW)
 
     @property
-    def torn(self) -> bool:
-        return self.off > _TORN * self.grid.spacing
+    def is_cover_better(self) -> bool:
+        """Whether the single layer is torn, and the double cover is not."""
+        return self.misfit > 1 and self._misfit(self.cover, self._off(self.cover)) < _BETTER * self.misfit
 
     @cached_property
     def cover(self) -> Mesh:
         """The double cover: both sides of the single layer, where these are the whole surface."""
-        if self._may_be_sheet() and self._is_whole() and not self.torn:
+        if self._may_be_sheet() and self._is_whole() and self.misfit <= 1:
             return both_sides(self.single[0], self.grid.spacing)
+        return self.extracted
+
+    @cached_property
+    def extracted(self) -> Mesh:
+        """The double cover extracted at an offset."""
         part = self.progress.part(0.7, 1.0, "double cover")
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
 
@@ -128,7 +148,7 @@ class _Layers:
             return True
         if self.meetings.through >= _THROUGH:
             return False
-        return self.meetings.beside <= _BESIDE or may_be_closed(self.values, self.local, self.grid)
+        return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
@@ -142,7 +162,7 @@ class _Layers:
         if not len(line):
             return not self.crossings.normal.any() and not pieces_touch(sheet, self.grid.spacing)
         sample = self.local.tree.query(sheet.vertices[line])[1]
-        return meetings.beside <= _BESIDE and meetings.at[sample].mean() >= _SEEN
+        return not meetings.side_by_side and meetings.at[sample].mean() >= _SEEN
 
 
 def _even(local, grid):
@@ -189,9 +209,14 @@ def extract_surfaces(
         meshes["double"] = layers.cover
     if kind in ("single", "both"):
         meshes["single"], unoriented = layers.single
-        if layers.torn and misfit(layers.cover, local.points) < _BETTER * layers.off:
+        if layers.is_cover_better:
             meshes["single"], unoriented = layers.cover, 0
             warnings.append(_said_of_torn(local, grid))
+        elif (share := (layers.off > _OFF).mean()) > _SOME:
+            warnings.append(
+                f"{share:.0%} of the points lie more than {_OFF:g} cells off the single layer, as where sheets run "
+                "closer than the grid's cells and one of them is missing; raise the resolution, or use the double cover"
+            )
         if unoriented:
             warnings.append(
                 f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "

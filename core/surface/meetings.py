@@ -25,7 +25,8 @@ _WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least memb
 _PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
-_WEAK, _BESIDE = 0.15, 8  # the same next to such samples, and how many are
+_WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
+_BESIDE = 0.05  # of the samples at meetings, more beside another sheet are no chance
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,11 @@ class Meetings:
     def share(self) -> float:
         """Of all samples."""
         return float(self.at.mean())
+
+    @property
+    def side_by_side(self) -> bool:
+        """Whether sheets run so close beside each other that single layers are torn there."""
+        return self.beside > _BESIDE
 
 
 def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
@@ -82,7 +88,7 @@ def _grown(sure, weak, nearest):
     """The samples marked as `weak` (n,) bool that others connect to `sure` ones, as weak edges of an image (Canny, IEEE
     PAMI 8(6), 1986), (n,) bool; `nearest` (n,k) tells which lie next to each other."""
     n, of = len(nearest), np.flatnonzero(weak)
-    beside = nearest[of, : 1 + _BESIDE]
+    beside = nearest[of, : 1 + _NEXT]
     row, column = np.nonzero(weak[beside])
     graph = coo_matrix((np.ones(len(row), bool), (of[row], beside[row, column])), shape=(n, n))
     part = connected_components(graph, directed=False)[1]

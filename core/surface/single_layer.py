@@ -1,15 +1,21 @@
 """The single layer: one sheet, open where the surface is open, non-manifold where sheets meet."""
 
+from collections.abc import Callable
+from functools import partial
+
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
+from ..settings import Settings
 from .centring import centred
 from .crossings import Crossings
+from .double_cover import double_cover
 from .dual_contour import dual_contour
 from .holes import fill_pinholes
 from .junctions import onto_junctions
 from .mesh import Mesh
+from .one_side import one_side
 from .open_sheet import open_sheet
 from .orientation import orient
 from .rims import at_rims, smooth_rims
@@ -30,7 +36,8 @@ def single_layer(
     sheet = sheet_of_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.5))
     if sheet is not None:
         return sheet, 0
-    return sheet_of_crossings(values, band, crossings, surface, grid, progress.part(0.5, 1.0))
+    cover = partial(double_cover, values, band, surface, grid, Settings().offset)
+    return sheet_of_crossings(values, band, crossings, surface, grid, cover, progress.part(0.5, 1.0))
 
 
 def sheet_of_sides(
@@ -55,25 +62,35 @@ def sheet_of_sides(
 
 
 def sheet_of_crossings(
-    values, band: NearBand, crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None
+    values,
+    band: NearBand,
+    crossings: Crossings,
+    surface: LocalSurface,
+    grid: Grid,
+    cover: Callable[[], Mesh],
+    progress=None,
 ) -> tuple[Mesh, int]:
     """Any surface as one sheet by :func:`dual_contour`, with edges of several faces where sheets meet.
 
     Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
     either side, and may have handles there; so it is taken only if the dual contour, which shows the line, cannot be
-    wound alike wherever it has two faces.
+    wound alike wherever it has two faces. Where sheets run side by side this may be torn, too; then it is one side of
+    the `cover`, a function that gives the double cover (see :func:`one_side`).
 
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress = Progress.of(progress)
     found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
     sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
-    if unoriented and crossings.normal.any():
-        signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
-        if signed is not None:
-            found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
-            return _finished(found, surface, grid, progress.part(0.9, 1.0))
-    return sheet, unoriented
+    if not (unoriented and crossings.normal.any()):
+        return sheet, unoriented
+    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
+    if signed is None:
+        return sheet, unoriented
+    if crossings.side_by_side:
+        return _finished(one_side(cover(), signed, surface, grid), surface, grid, Progress())
+    found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
+    return _finished(found, surface, grid, progress.part(0.9, 1.0))
 
 
 def _finished(mesh, surface, grid, progress):

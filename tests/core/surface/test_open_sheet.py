@@ -58,11 +58,16 @@ def test_its_rim_is_where_the_samples_end():
 
 
 def test_a_creased_scan_is_wound_alike():
-    """A bust, open below: of its dual contour 246 edges have three faces or more, and 293 cannot be wound alike."""
+    """A bust, open below: of its dual contour 246 edges have three faces or more, and 293 cannot be wound alike. What
+    lies between its sides was in ten pieces, and went to and fro between the two walls of its foot."""
     run = single(read_points("tests/data/bust.ply"), resolution=128, denoise="auto")
     assert run.sheet.edge_counts()[1].max() == 2
-    assert run.report["warnings"] == []
-    assert KDTree(run.sheet.vertices).query(run.points)[0].max() < 2.5 * run.field.spacing
+    assert len(shapes.components(run.sheet)) == run.sheet.border_loops() == 1
+    (warning,) = run.report["warnings"]
+    assert "4% of the points lie more than 0.5 cells off the single layer" in warning
+    away = KDTree(run.sheet.vertices).query(run.points)[0] / run.field.spacing
+    assert np.percentile(away, 99) < 1.2
+    assert away.max() < 3  # behind the ears, in slits narrower than two cells
 
 
 def test_sheets_that_pass_through_each_other_askew_are_wound_alike():
