@@ -105,31 +105,28 @@ class _Layers:
         return sheet_of_crossings(*given, lambda: self.extracted, part)
 
     @cached_property
-    def off(self) -> np.ndarray:
-        """Distances of samples to the single layer, in cells; 0 where that bounds the inside."""
-        return np.zeros(1) if self.sides.complete else self._off(self.single[0])
+    def fit(self) -> tuple[float, float]:
+        """Misfit of the single layer, which is torn beyond 1, and share of the samples that are off it; 0 where it
+        bounds the inside."""
+        return (0.0, 0.0) if self.sides.complete else self._fit(self.single[0])
 
-    def _off(self, mesh):
-        return distances(mesh, self.local.points) / self.grid.spacing
-
-    @cached_property
-    def misfit(self) -> float:
-        """Beyond 1 the single layer is torn."""
-        return 0.0 if self.sides.complete else self._misfit(self.single[0], self.off)
-
-    def _misfit(self, mesh, off):
-        """How far samples are off a mesh, or how much of it is turned away from them, whichever is worse."""
-        return max(off.mean() / _TORN, askew(mesh, self.local.tree, self.local.normals) / _ASKEW)
+    def _fit(self, mesh):
+        """How far samples are off a mesh, or how much of it is turned away from them, whichever is worse, as
+        its misfit; and the share of the samples that are off it."""
+        off = distances(mesh, self.local.points) / self.grid.spacing
+        turned = askew(mesh, self.local.tree, self.local.normals)
+        return max(off.mean() / _TORN, turned / _ASKEW), (off > _OFF).mean()
 
     @property
     def is_cover_better(self) -> bool:
         """Whether the single layer is torn, and the double cover is not."""
-        return self.misfit > 1 and self._misfit(self.cover, self._off(self.cover)) < _BETTER * self.misfit
+        misfit = self.fit[0]
+        return misfit > 1 and self._fit(self.cover)[0] < _BETTER * misfit
 
     @cached_property
     def cover(self) -> Mesh:
         """The double cover: both sides of the single layer, where these are the whole surface."""
-        if self._may_be_sheet() and self._is_whole() and self.misfit <= 1:
+        if self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1:
             return both_sides(self.single[0], self.grid.spacing)
         return self.extracted
 
@@ -212,7 +209,7 @@ def extract_surfaces(
         if layers.is_cover_better:
             meshes["single"], unoriented = layers.cover, 0
             warnings.append(_said_of_torn(local, grid))
-        elif (share := (layers.off > _OFF).mean()) > _SOME:
+        elif (share := layers.fit[1]) > _SOME:
             warnings.append(
                 f"{share:.0%} of the points lie more than {_OFF:g} cells off the single layer, as where sheets run "
                 "closer than the grid's cells and one of them is missing; raise the resolution, or use the double cover"

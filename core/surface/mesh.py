@@ -46,6 +46,12 @@ class Mesh:
         rows = np.concatenate([first, self.pairs + first, np.flatnonzero(rest)])
         return replace(self, faces=self.faces[rows], pairs=len(first))
 
+    def part(self, kept: np.ndarray) -> "Mesh":
+        """The mesh of the faces marked in `kept`, as :meth:`of_faces`, with their vertices alone."""
+        mesh = self.of_faces(kept)
+        vertices, faces = in_use(mesh.vertices, mesh.faces)
+        return replace(mesh, vertices=vertices, faces=faces.astype(np.int32))
+
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
         ends, count = edges_of(self.faces, len(self.vertices))
@@ -86,6 +92,14 @@ def edge_numbers(faces: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     table = edge_table(faces, n)
     count, table.data = table.data, np.arange(len(table.data))
     return looked_up(table, faces, np.roll(faces, -1, axis=1)), count
+
+
+def faces_across(edge: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both faces, (p,) int64 each, of the edges that have two, in order, by what :func:`edge_numbers` gives."""
+    owner, edge = np.repeat(np.arange(len(edge)), edge.shape[1]), edge.reshape(-1)
+    inner, last = count == 2, np.empty(len(count), np.int64)
+    last[edge] = owner
+    return (np.bincount(edge, owner).astype(np.int64) - last)[inner], last[inner]
 
 
 def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

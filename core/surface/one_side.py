@@ -1,15 +1,12 @@
 """The single layer as one side of a double cover."""
 
-from dataclasses import replace
-
 import numpy as np
-from scipy.sparse import coo_matrix
 
 from ..field.blocks import Blocks, at_nodes
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
-from ..linalg import cross, lengths
-from .mesh import Mesh, at_corners, edge_numbers, in_use
+from ..linalg import cross, lengths, symmetric
+from .mesh import Mesh, at_corners, edge_numbers, faces_across
 from .pieces import pieces_with_samples
 
 _OFF = 0.7, 1.0, 1.3  # cells from a face, where its side is told
@@ -27,25 +24,16 @@ def one_side(cover: Mesh, signed: np.ndarray | Blocks, surface: LocalSurface, gr
     """
     corners = np.stack(at_corners(cover.vertices, cover.faces))
     middle, normal = corners.mean(axis=0), cross(corners[1] - corners[0], corners[2] - corners[0])
-    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    area = lengths(normal)
+    normal /= np.maximum(area, np.finfo(float).tiny)
     side = np.zeros(len(cover.faces))
     for off in _OFF:
         found = at_nodes(signed, grid.nearest_nodes((middle + off * grid.spacing * normal).T))
         side += np.where(np.abs(found) <= _KNOWN * grid.spacing, np.sign(found), 0) / len(_OFF)
-    beside = _beside(cover)
+    pairs = faces_across(*edge_numbers(cover.faces, len(cover.vertices)))
+    beside = symmetric(np.ones(len(pairs[0])), *pairs, len(cover.faces))
     for _ in range(_ROUNDS):
         side = 0.5 * (side + beside @ np.sign(side) / 3)
-    area, front = cover.face_areas(), side > 0
-    mesh = cover.of_faces(front if area[front].sum() >= area[~front].sum() else ~front)
-    vertices, faces = in_use(mesh.vertices, mesh.faces)
-    mesh = replace(mesh, vertices=vertices, faces=faces.astype(np.int32))
-    return pieces_with_samples(mesh, surface.tree, grid.spacing)
-
-
-def _beside(mesh):
-    """Which faces share an edge, (f,f) sparse."""
-    count, edge = len(mesh.faces), edge_numbers(mesh.faces, len(mesh.vertices))[0].reshape(-1)
-    edges_of_faces = coo_matrix((np.ones(3 * count), (np.repeat(np.arange(count), 3), edge))).tocsr()
-    beside = edges_of_faces @ edges_of_faces.T
-    beside.setdiag(0)
-    return beside
+    front = side > 0
+    side_with_more = cover.part(front if area[front].sum() >= area[~front].sum() else ~front)
+    return pieces_with_samples(side_with_more, surface.tree, grid.spacing)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 
 from ..linalg import cross, dots
-from .mesh import Mesh, at_corners, edge_numbers
+from .mesh import Mesh, at_corners, edge_numbers, faces_across
 from .spreading import spread_signs
 
 
@@ -20,12 +20,9 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     n = len(mesh.faces)
     if not n:
         return mesh, 0
-    edge, count = (each.reshape(-1) for each in edge_numbers(mesh.faces, len(mesh.vertices)))
-    owner, forward = np.repeat(np.arange(n), 3), (mesh.faces < np.roll(mesh.faces, -1, axis=1)).reshape(-1)
-    inner, last = count == 2, np.empty(len(count), np.int64)
-    last[edge] = owner
-    pair = (np.bincount(edge, owner).astype(np.int64) - last)[inner], last[inner]
-    against = np.bincount(edge, forward)[inner] != 1
+    edge, count = edge_numbers(mesh.faces, len(mesh.vertices))
+    pair, forward = faces_across(edge, count), mesh.faces < np.roll(mesh.faces, -1, axis=1)
+    against = np.bincount(edge.reshape(-1), forward.reshape(-1))[count == 2] != 1
 
     links = coo_matrix((np.where(against, 2, 1), pair), shape=(n, n)).tocsr()
     links = links.maximum(links.T)

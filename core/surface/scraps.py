@@ -4,15 +4,13 @@ A spur is a small patch that ends in a border right past the line. A pocket is c
 two quads with one rim, for instance.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..field.local_surface import LocalSurface
 from ..linalg import row_dots
-from .mesh import Mesh, edge_numbers, in_use
+from .mesh import Mesh, edge_numbers
 
 _SMALL = 32  # faces of a patch
 _PAST = 1.5  # cells, that a spur goes past the line
@@ -43,9 +41,7 @@ def without_scraps(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
         face = face[~dropped]
     if kept.all():
         return mesh
-    mesh = mesh.of_faces(kept)
-    vertices, faces = in_use(mesh.vertices, mesh.faces)
-    return replace(mesh, vertices=vertices, faces=faces.astype(np.int32))
+    return mesh.part(kept)
 
 
 def _patches(edge, counts):
