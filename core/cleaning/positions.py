@@ -9,6 +9,7 @@ import numpy as np
 from ..given_arrays import finite_points
 from ..progress import Progress
 from ..settings import Settings
+from .clusters import Clusters
 from .noise import noisy_samples
 from .noise_level import LADDER, estimate_noise
 from .quadrics import fit_quadrics
@@ -64,10 +65,10 @@ def _rounded(neighbours, n):
 
 
 def _onto_quadrics(points, noisy, neighbours, progress):
-    moved = points.copy()
+    moved, clusters = points.copy(), Clusters(points)
     sizes = np.unique(neighbours[noisy])
     for i, k in enumerate(sizes):
         rows = np.flatnonzero(noisy & (neighbours == k))
         part = progress.part(i / len(sizes), (i + 1) / len(sizes))
-        moved[rows] += fit_quadrics(points, rows, int(k), part).step
+        moved[rows] += fit_quadrics(points, rows, int(k), part, clusters).step
     return moved

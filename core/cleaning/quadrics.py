@@ -1,6 +1,6 @@
 """Robust quadrics through the neighbours of samples."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -9,6 +9,7 @@ from ..field.curvature import tangent_frames
 from ..linalg import COMPONENTS, dots, principal_axes, row_dots, solve_positive
 from ..parallel import even_chunks, work_through
 from ..progress import Progress
+from .clusters import Clusters
 
 GAUSS = 1.4826  # standard deviations in a median absolute error
 COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
@@ -16,6 +17,8 @@ _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
+_SINGLY = 200  # neighbours, above which the means of clusters stand for them
+_MEANS = 128  # at most, where the clusters are all full; with half as many, slight noise is averaged a tenth less
 _CHUNK, _QUERIED = 60_000, 300_000  # neighbours, fitted and asked for at a time
 
 # Where the moments 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy stand in the normal equations.
@@ -51,25 +54,36 @@ class Quadrics:
         return self.height / (1.0 - self.leverage)
 
 
-def fit_quadrics(points, rows, neighbours: int, progress=None) -> Quadrics:
+def fit_quadrics(points, rows, neighbours: int, progress=None, clusters: Clusters | None = None) -> Quadrics:
     """Quadric height fields over the tangent planes of samples `rows`, each through its `neighbours` nearest.
 
-    points : (n,3) float64     rows : (m,) int
+    points : (n,3) float64     rows : (m,) int     clusters : of the points, where they are at hand
 
     The plane is the weighted principal plane; weights of the quadric fall with the squared distance and, in a second
-    round, with the residual (Cauchy), so that a few strays do not bend the fit.
+    round, with the residual (Cauchy), so that a few strays do not bend the fit. More than 200 neighbours are taken as
+    the means of clusters of them, which in a neighbourhood so wide are small.
     """
-    return nested_quadrics(points, rows, (neighbours,), progress)[0]
+    if neighbours <= _SINGLY:
+        return nested_quadrics(points, rows, (neighbours,), progress)[0]
+    means = (clusters or Clusters(points)).means(2 ** int(np.ceil(np.log2(neighbours / _MEANS))))
+    share = len(means) / len(points)
+    (found,) = _through(means, points[rows], (round(share * neighbours),), progress)
+    return replace(found, leverage=share * found.leverage)
 
 
 def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
-    """The same through each of several numbers of neighbours, `sizes`, in rising order."""
+    """The same through each of several numbers of neighbours, `sizes`, in rising order, all of them singly."""
+    return _through(points, points[rows], sizes, progress)
+
+
+def _through(points, places, sizes, progress):
+    """Quadrics of places (m,3) through each of several numbers of the nearest points (n,3)."""
     tree, columns, most = KDTree(points), points.T.copy(), int(sizes[-1])
-    found = [Quadrics(np.empty((len(rows), 3)), *np.empty((3, len(rows)))) for _ in sizes]
+    found = [Quadrics(np.empty((len(places), 3)), *np.empty((3, len(places)))) for _ in sizes]
 
     def fit(part):
-        distance, index = tree.query(points[rows[part]], k=most)
-        offset = [x.take(index) - x.take(rows[part])[:, None] for x in columns]
+        distance, index = tree.query(places[part], k=most)
+        offset = [x.take(index) - x_here[:, None] for x, x_here in zip(columns, places[part].T, strict=True)]
         for quadrics, k in zip(found, sizes, strict=True):
             for first in range(0, len(index), step := max(1, _CHUNK // k)):
                 some = slice(first, first + step)
@@ -77,7 +91,7 @@ def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
                 at = slice(part.start + first, min(part.start + first + step, part.stop))
                 quadrics.step[at], quadrics.height[at], quadrics.leverage[at], quadrics.radius[at] = piece
 
-    work_through(fit, even_chunks(len(rows), max(1, _QUERIED // most), Progress.of(progress)))
+    work_through(fit, even_chunks(len(places), max(1, _QUERIED // most), Progress.of(progress)))
     return found
 
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from core.cleaning.noise import looks_noisy, noisy_samples
-from core.cleaning.noise_level import LADDER, estimate_noise
+from core.cleaning.noise_level import LADDER, estimate_noise, in_full
+from core.cleaning.quadrics import fit_quadrics
 from core.points import local_spacing
 from tests import shapes
 
@@ -147,6 +148,40 @@ def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():
     assert LADDER[0] <= few < many <= LADDER[-1] * 1.001
     flat = np.median(estimate_noise(noisy(shapes.square(6000), 0.002)).neighbours)
     assert few < flat
+
+
+@pytest.mark.parametrize("deviation", [0.02, 0.06])
+def test_noise_of_many_spacings_is_measured_in_neighbourhoods_wide_enough(deviation):
+    points = noisy(shapes.scattered_sphere(40000), deviation)
+    found = estimate_noise(points)
+    assert np.median(found.level) == pytest.approx(deviation, rel=0.15)
+    assert np.median(found.neighbours) > 2 * LADDER[-1]
+
+
+def test_a_thin_ring_is_not_taken_for_noise():
+    """It is two and a half times as thick as the noise; neighbourhoods that reach round it see all of that."""
+    found = estimate_noise(noisy(shapes.torus(20000, major=1.0, minor=0.15), 0.06))
+    assert np.median(found.level) == pytest.approx(0.06, rel=0.2)
+
+
+def test_a_sample_far_off_counts_as_noisy_as_those_around():
+    points = np.vstack([noisy(shapes.scattered_sphere(2400), 0.1), [[1.7, 0, 0]]])
+    level = estimate_noise(points).level
+    assert level[-1] > 0.6 * np.median(level)
+
+
+@pytest.mark.parametrize("samples", [200, 800])
+def test_the_share_of_noise_that_quadrics_follow(samples):
+    """On a plane, read back as a level; singly and by clusters."""
+    points = shapes.square(20000)
+    for share in (0.08, 0.12, 0.17):
+        radius = np.sqrt(4 * samples / len(points) / np.pi)
+        seen = noisy(points, share * radius)
+        rows = np.flatnonzero(np.abs(seen[:, :2]).max(axis=1) < 0.6)[:1500]
+        fit = fit_quadrics(seen, rows, samples)
+        left = np.sqrt(np.mean(fit.left_out() ** 2) * (1 - np.median(fit.leverage)))
+        found = in_full(np.array([[left]]), np.array([[np.median(fit.radius)]]), np.zeros(1, int))
+        assert found[0] == pytest.approx(share * radius, rel=0.06)
 
 
 def test_estimates_follow_the_scale():

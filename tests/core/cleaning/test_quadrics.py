@@ -65,3 +65,16 @@ def test_neighbourhoods_within_one_another_are_fitted_as_each_by_itself():
         np.testing.assert_array_equal(fit.leverage, alone.leverage)
         farthest = np.sort(np.linalg.norm(points[rows, None] - points, axis=2), axis=1)[:, size - 1]
         np.testing.assert_allclose(fit.radius, farthest, rtol=1e-12)
+
+
+def test_clusters_stand_for_the_points_of_wide_neighbourhoods():
+    points = shapes.scattered_sphere(20000)
+    points = points + np.random.default_rng(2).normal(size=points.shape) * 0.02
+    rows = np.arange(0, len(points), 50)
+    wide, (singly,) = fit_quadrics(points, rows, 800), nested_quadrics(points, rows, (800,))
+    true = np.linalg.norm(points[rows], axis=1)[:, None] - 1
+    off, off_singly = (np.abs(np.linalg.norm(points[rows] + fit.step, axis=1) - 1).mean() for fit in (wide, singly))
+    assert off < 1.15 * off_singly < 0.2 * np.abs(true).mean()
+    assert np.linalg.norm(wide.step - singly.step, axis=1).mean() < 0.1 * singly.height.mean()
+    np.testing.assert_allclose(np.median(wide.leverage), np.median(singly.leverage), rtol=0.1)
+    np.testing.assert_allclose(np.median(wide.radius), np.median(singly.radius), rtol=0.1)
