@@ -24,7 +24,9 @@ from .noise_measure import (
     FAINT,
     HALF_NOISE,
     JET_NEIGHBOURS,
+    MORE,
     NOISE,
+    NOISE_OF_MORE,
     PCA_NEIGHBOURS,
     SHIFTS,
     SLIGHT,
@@ -32,6 +34,7 @@ from .noise_measure import (
     measure_between,
     measure_faint,
     measure_half,
+    measure_more,
     measure_noise,
     measure_shifted,
     measure_slight,
@@ -103,6 +106,14 @@ CPU time of a whole run, median over the rows: alternation {alternating_cost:.1f
 Published CD, **on other shapes** and so no comparison but a scale, beside those here:
 
 {published}
+
+### More points
+
+The same noise on more points of the true surface, so that there are more to average over. CD (HD). *distance*: mean of
+the points to the true surface, as they come and as they are moved; *neighbours*: how many the median sample is moved
+with. *pieces*: the double cover of a closed surface has two, that of an open one has one.
+
+{more}
 
 ### Slight noise
 
@@ -236,6 +247,12 @@ def measure(cases: list[Case], others: list[Path], shape: Path) -> dict:
         "wires": [said(f"wires, {name}", noise_wires.measure(name)) for name in noise_wires.WIRES],
         "uneven": [said(name, noise_uneven.measure(name)) for name in noise_uneven.UNEVEN],
         "faint": [said(f"{case.name}, faint noise", measure_faint(case, *how)) for case in cases[:2] for how in FAINT],
+        "more": [
+            said(f"{case.name}, {count:,} points, {p} %", measure_more(case, count, p))
+            for case in cases[:2]
+            for p in NOISE_OF_MORE
+            for count in MORE
+        ],
         "slight": [said(f"{case.name}, slight noise", measure_slight(case, by)) for case in cases for by in SLIGHT],
         "shifted": [said(f"{case.name}, two scans", measure_shifted(case, by)) for case in cases for by in SHIFTS],
         "between": [said(f"{case.name}, {p} %", measure_between(case, p)) for case in cases for p in published.NOISE],
@@ -311,6 +328,7 @@ def write_page(measured: dict, docs: Path) -> Path:
         taken=tables.listed(f"{share:.1%} of {name}" for name, share in measured["clean"].items() if share),
         strays=tables.markdown(tables.strays(measured["strays"])),
         published=tables.markdown(tables.beside_published(measured)),
+        more=tables.markdown(tables.more(measured["more"])),
         slight=tables.markdown(tables.by_level(measured["slight"], "noise")),
         shifted=tables.markdown(tables.by_level(measured["shifted"], "shift")),
         faint=tables.markdown(tables.faint(measured["faint"])),

@@ -13,12 +13,13 @@ from core.normals.pca import pca_normals
 from core.points import local_spacing, prepare_samples
 
 from .cases import Case
-from .geometry import closest_points
+from .geometry import closest_points, face_normals, surface_samples
 from .metrics import surface_errors, topology
 from .peers import PEERS, Clock, poisson
 from .processes import Failed, run_fresh
 
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
+MORE, NOISE_OF_MORE = (10_000, 30_000, 100_000), (0.5, 1.0, 2.0)  # points; per cent of the longest side
 HALF_NOISE = 0.5
 FAINT = [("slab", 0.5, level) for level in (0.05, 0.1, 0.15, 0.2)]  # part, its share of the points, local spacings
 FAINT += [("cap", share, 0.4) for share in (0.04, 0.08)]
@@ -64,6 +65,29 @@ def measure_noise(case: Case, percent: float) -> dict:
         "before": _distance(points, case.truth),
         "pca": {"nc": agreement[best], "k": best},
         **found,
+    }
+
+
+def measure_more(case: Case, count: int, percent: float) -> dict:
+    """What becomes of so many points of the true surface with noise: errors and pieces of the surface, distances of the
+    points to the true one, x1e3, and what Poisson makes of them."""
+    points, face = surface_samples(case.truth, count, np.random.default_rng(count))
+    case = replace(case, points=points, normals=face_normals(case.truth)[face])
+    points = noisy(case, percent)
+    result = reconstruct(points)
+    cleaning, peer = result.report["cleaning"], by_peer(_poisson, case, points)
+    return {
+        "case": case.name,
+        "points": count,
+        "percent": percent,
+        "deviation": 10 * percent * np.ptp(case.points, axis=0).max(),
+        "noise": 1e3 * cleaning["noise"],
+        "neighbours": cleaning["neighbours"],
+        "before": _distance(points, case.truth),
+        "after": _distance(result.points, case.truth),
+        "pieces": topology(result.surface)["components"],
+        "ours": cd_and_hd(result.surface, case.truth),
+        **({"poisson": peer} if peer else {}),
     }
 
 

@@ -39,6 +39,22 @@ def surfaces(rows):
         yield row["case"], f"{row['percent']:g}", *cells(row, ways)
 
 
+def more(rows):
+    yield "case", "noise %", "points", "distance", "measured", "neighbours", "here", "pieces", "Poisson"
+    for row in rows:
+        yield (
+            row["case"],
+            f"{row['percent']:g}",
+            f"{row['points']:,}",
+            f"{row['before']:.2f} → {row['after']:.2f}",
+            f"{row['noise']:.2f} / {row['deviation']:.2f}",
+            str(row["neighbours"][1]),
+            *cells(row, ("ours",)),
+            str(row["pieces"]),
+            *cells(row, ("poisson",)),
+        )
+
+
 def halves(rows):
     yield "case", "moved", "noisy half, before → after", "CD", "`denoise=0`", "`denoise=1`"
     for row in rows:

@@ -23,6 +23,7 @@ from benchmarks.noise_measure import (
     STRAYS,
     by_peer,
     half_noisy,
+    measure_more,
     measure_shifted,
     measure_slight,
     measure_strays,
@@ -104,6 +105,22 @@ def test_slight_noise_is_moved_as_all_noise_is_and_so_are_shifted_scans(measure,
     assert found["ours"] == found["every"]
     assert found["ours"]["cd"] < found["none"]["cd"]
     assert measure(case, 0.0)["moved"] == 0.0
+
+
+def test_more_points_of_the_same_noise_come_closer(monkeypatch):
+    monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
+    monkeypatch.setattr(
+        noise_measure, "reconstruct", partial(noise_measure.reconstruct, settings=Settings(resolution=32))
+    )
+    monkeypatch.setattr(noise_measure, "by_peer", lambda *_: {})
+    truth = closed.torus().mesh
+    case = Case("torus", np.empty((0, 3)), np.empty((0, 3)), truth, np.empty((0, 3)), {"category": "watertight"})
+    few, many = (measure_more(case, count, 1.0) for count in (1000, 4000))
+    assert (many["points"], many["pieces"]) == (4000, 2)
+    assert many["before"] == pytest.approx(few["before"], rel=0.1)
+    assert many["after"] < 0.8 * few["after"] < 0.64 * few["before"]
+    assert many["noise"] == pytest.approx(many["deviation"], rel=0.15)
+    assert "poisson" not in many
 
 
 @pytest.mark.parametrize("name", WIRES)
@@ -211,6 +228,20 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2, said=1.1, lost=0.0)
         "faint": [
             {"case": "one", "part": "cap", "share": 0.04, "level": 0.4, "moved": 0.0, "cd": 0.204, "cd_best": 0.199}
         ],
+        "more": [
+            {
+                "case": "one",
+                "points": 30_000,
+                "percent": 2.0,
+                "deviation": 16.0,
+                "noise": 15.84,
+                "before": 12.7,
+                "after": 2.1,
+                "neighbours": [91, 362, 512],
+                "pieces": 2,
+                "ours": {"cd": 2.1, "hd": 11.2},
+            },
+        ],
         "slight": [
             {"case": "one", "level": 0.03, "moved": 1.0}
             | {way: {"cd": cd, "hd": 9.4} for way, cd in (("ours", 0.14), ("none", 0.43), ("every", 0.14))}
@@ -253,6 +284,7 @@ def test_page_holds_every_row_and_no_raw_bytes(tmp_path):
     assert "taken for noisy: 25.0% of other, uniform." in page
     assert "| junk | refused | a·b·ccc" in page
     assert "| a helix | – / 0.0% | 81% / 0.2% |" in page
+    assert "| one | 2 | 30,000 | 12.70 → 2.10 | 15.84 / 16.00 | 362 | 2.100 (11) | 2 | – |" in page
     assert "| one | 0.03 | 100% | 0.140 (9) | 0.430 (9) | 0.140 (9) |" in page
     assert "| one | 0.2 | 50% | 0.240 (8) | 0.530 (8) | 0.220 (8) |" in page
     assert "| one | cap | 4% | 0.4 | 0% | 0.204 | 0.199 |" in page
