@@ -13,7 +13,7 @@ class Clusters:
         self.points = points
 
     def means(self, size: int) -> np.ndarray:
-        """Means (m,3) of clusters of `size` points, two or more, or fewer, but at least half as many."""
+        """Means (m,3) of clusters of at most `size` points, and at least half as many if there are."""
         order, starts = self._cells
         start = next(start for start in starts if np.diff(start, append=len(order)).max() <= size)
         return np.add.reduceat(self.points[order], start, axis=0) / np.diff(start, append=len(order))[:, None]

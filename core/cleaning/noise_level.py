@@ -18,11 +18,12 @@ _PART, _MOST = 0.025, 0.1  # of the cloud, that these hold at most: more see the
 _WRAPPED = 0.97, 1.3  # times the level seen in the one before, outside of which they reach round the shape
 
 _SEEN = 10.0  # a fit shows nearly all of the noise once its radius is this many times its left-out error
-_USABLE = 5.5  # and most of it, well enough to tell the rest, once its radius is this many times the noise
+_USABLE = 6.0  # and most of it, well enough to tell the rest, once its radius is this many times the noise
+_LEAST = 4.0  # a narrower one follows more of it than is known
 _FOLLOWED = 1.47, 1.5, 0.5  # scale, power and most of the share they follow: within .03 on planes by 50 to 2000 samples
 _ROUNDS = 10  # after which level and share agree
 _STRAY = 4.5  # errors count as at most this many median ones
-_FREEDOM = 2.0  # a robust fit follows its samples more than its leverage says
+_FREEDOM = 3.0  # a robust fit follows its samples more than its leverage says
 _UNEVEN = 2.0  # a region's noise counts as at most this many times the median: two close sheets look like noise
 
 
@@ -46,7 +47,9 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     neighbourhood wide enough to see most of the noise. Of the square of what a fit misses, the rest is bent away. Every
     region takes the neighbourhood of least risk, the squared error that is expected of its quadric:
 
-        bent^2 + level^2 (2 <leverage> + f^2)
+        bent^2 + level^2 (3 <leverage> + f^2)
+
+    What is bent away may come out negative; where most of it is noise, how it grows is what tells.
     """
     progress = Progress.of(progress)
     anchors, region = spread_anchors(points, seed)
@@ -79,8 +82,10 @@ def _of_least_risk(seen, counted):
     level = np.minimum(level, in_full(levels, radius, _first(sound & (radius >= _USABLE * level), last)))
     level = np.minimum(level, _UNEVEN * np.median(level[counted]))
     followed = _followed(level, radius)
-    bent = np.maximum(levels**2 - (level * (1 - followed)) ** 2, 0)
-    risk = np.where(sound, bent + level**2 * (_FREEDOM * leverage + followed**2), np.inf)
+    bent = levels**2 - (level * (1 - followed)) ** 2
+    risk = bent + level**2 * (_FREEDOM * leverage + followed**2)
+    narrow = np.arange(len(seen))[:, None] < _first(sound & (radius >= _LEAST * level), last)
+    risk[narrow | ~sound] = np.inf
     return level, risk.argmin(axis=0), (radius[-1] < _USABLE * level).mean() > 0.5
 
 
