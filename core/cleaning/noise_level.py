@@ -44,12 +44,11 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
 
     A quadric through the k nearest, within a radius r, misses the sample that it leaves out by the noise, but for the
     share f = (1.47 level / r)^1.5 that it follows, and by what it cannot bend to. The level is read off the smallest
-    neighbourhood wide enough to see most of the noise. Of the square of what a fit misses, the rest is bent away. Every
-    region takes the neighbourhood of least risk, the squared error that is expected of its quadric:
+    neighbourhood wide enough to see most of the noise. Of the square of what a fit misses, the rest is bent away; that
+    may come out negative, as it is its growth that tells. Every region takes the neighbourhood of least risk, the
+    squared error that is expected of its quadric (after C. Stein, Annals of Statistics 9(6), 1981):
 
         bent^2 + level^2 (3 <leverage> + f^2)
-
-    What is bent away may come out negative; where most of it is noise, how it grows is what tells.
     """
     progress = Progress.of(progress)
     anchors, region = spread_anchors(points, seed)

@@ -18,7 +18,7 @@ _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weigh
 _STIFFNESS = 1e-6
 _EXACT = 1e-9  # residuals below this share of the radius are rounding
 _SINGLY = 200  # neighbours, above which the means of clusters stand for them
-_MEANS = 128  # at most, where the clusters are all full; with half as many, slight noise is averaged a tenth less
+_MEANS = 128  # of them then, at most, where all clusters are full
 _CHUNK, _QUERIED = 60_000, 300_000  # neighbours, fitted and asked for at a time
 
 # Where the moments 1, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy stand in the normal equations.
