@@ -36,8 +36,11 @@ _SHIFTED_BY = np.array([0.33, 0.44, 0.835])  # direction, which no case has for 
 def noisy(case: Case, percent: float, seed: int = 0) -> np.ndarray:
     """Points (n,3) of the case with Gaussian noise in every coordinate; its deviation is in per cent of their longest
     side."""
-    deviation = 0.01 * percent * np.ptp(case.points, axis=0).max()
-    return case.points + np.random.default_rng(seed).normal(size=case.points.shape) * deviation
+    return case.points + np.random.default_rng(seed).normal(size=case.points.shape) * _deviation(case, percent)
+
+
+def _deviation(case, percent):
+    return 0.01 * percent * np.ptp(case.points, axis=0).max()
 
 
 def strewn(case: Case, share: float, seed: int = 0) -> np.ndarray:
@@ -61,7 +64,7 @@ def measure_noise(case: Case, percent: float) -> dict:
         "case": case.name,
         "points": len(points),
         "percent": percent,
-        "deviation": 10 * percent * np.ptp(case.points, axis=0).max(),
+        "deviation": 1e3 * _deviation(case, percent),
         "before": _distance(points, case.truth),
         "pca": {"nc": agreement[best], "k": best},
         **found,
@@ -80,7 +83,7 @@ def measure_more(case: Case, count: int, percent: float) -> dict:
         "case": case.name,
         "points": count,
         "percent": percent,
-        "deviation": 10 * percent * np.ptp(case.points, axis=0).max(),
+        "deviation": 1e3 * _deviation(case, percent),
         "noise": 1e3 * cleaning["noise"],
         "neighbours": cleaning["neighbours"],
         "before": _distance(points, case.truth),

@@ -1,16 +1,17 @@
 """Points gathered into small clusters, whose means stand for them in wide neighbourhoods."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 
+@dataclass(frozen=True)
 class Clusters:
     """Clusters of points (n,3): the cells of a k-d tree, halved at medians across their longest sides (J. H. Friedman,
     J. L. Bentley and R. A. Finkel, ACM TOMS 3(3), 1977)."""
 
-    def __init__(self, points: np.ndarray):
-        self.points = points
+    points: np.ndarray
 
     def means(self, size: int) -> np.ndarray:
         """Means (m,3) of clusters of at most `size` points, and at least half as many if there are."""
