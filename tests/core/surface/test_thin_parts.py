@@ -8,6 +8,7 @@ from core import Settings, reconstruct
 from core.field.grid import fit_grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.surface.misfit import distances
 from core.surface.thin_parts import ThinParts, find_thin_parts
 from tests import shapes
 
@@ -65,7 +66,7 @@ def test_samples_with_one_side_alone_are_found_and_the_surface_is_lifted_there(b
     np.testing.assert_allclose(parts.lift(samples), sign * 0.8 * grid.spacing)
     away = np.array([0, 0, 1]) * (np.array([[0], [1.5], [2.75], [4], [9]]) * grid.spacing)
     top = samples[samples[:, 2].argmax()]
-    one = ThinParts(*(top[None], samples[:0])[::sign], grid.spacing)
+    one = ThinParts(*(top[None], samples[:0])[::sign], samples[:0], grid.spacing)
     np.testing.assert_allclose(one.lift(top + away) / grid.spacing, sign * np.array([0.8, 0.8, 0.4, 0, 0]), atol=1e-9)
 
 
@@ -78,6 +79,26 @@ def test_values_are_lowered_near_the_surface_alone(ball):
     np.testing.assert_array_equal(lifted[~near], given[~near])
     at = grid.positions(np.flatnonzero(near))
     np.testing.assert_allclose(lifted[near], given[near] - parts.lift(at), atol=1e-6)
+
+
+def test_slits_give_way_to_clear_samples_and_thin_parts_do_not():
+    """Over a cell, from where they are half a cell nearer to where these are."""
+    at = np.array([[0.0, 0, 0], [0.75, 0, 0], [1, 0, 0], [1.25, 0, 0], [2, 0, 0]])
+    none, here, clear = np.empty((0, 3)), at[:1], at[-1:]
+    np.testing.assert_allclose(ThinParts(none, here, clear, 1.0).lift(at), -0.8 * np.array([1, 1, 0.5, 0, 0]))
+    np.testing.assert_allclose(ThinParts(here, none, clear, 1.0).lift(at), 0.8 * np.array([1, 1, 1, 1, 0.8]))
+
+
+def test_a_wall_is_kept_with_something_thinner_than_a_cell_right_behind_it():
+    """A rod along an arc under the skin of a ball took the skin with it, whose samples were up to .77 cells off."""
+    rng, ball = np.random.default_rng(0), shapes.sphere(6000)
+    along, turn = rng.uniform(-0.6, 0.6, 800), rng.uniform(0, 2 * np.pi, 800)
+    depth = 0.94 + 0.01 * np.cos(turn)
+    rod = np.column_stack([depth * np.cos(along), depth * np.sin(along), 0.01 * np.sin(turn)])
+    run = reconstruct(np.concatenate([ball, rod]), Settings(resolution=64, surface="single", denoise=0))
+    assert run.field.spacing > 0.02
+    skin = ball[np.arccos(np.clip(ball[:, 0], -1, 1)) < 0.8]
+    assert distances(run.sheet, skin).max() < 0.2 * run.field.spacing
 
 
 @pytest.mark.parametrize(("surface", "band"), [("single", None), ("signed", None), ("single", 4.0)])
@@ -104,7 +125,7 @@ def test_a_slit_narrower_than_a_cell_is_kept():
 
 
 def test_thin_parts_away_from_places_are_left():
-    parts = ThinParts(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[0.0, 9, 0]]), 1.0)
+    parts = ThinParts(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[0.0, 9, 0]]), np.empty((0, 3)), 1.0)
     assert parts.away_from(np.empty((0, 3))) is parts
     left = parts.away_from(np.array([[3.9, 0, 0], [0, 9, 4.1]]))
     np.testing.assert_array_equal(left.thin, [[9, 0, 0]])
