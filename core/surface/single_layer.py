@@ -3,6 +3,9 @@
 from collections.abc import Callable
 from functools import partial
 
+import numpy as np
+from scipy.spatial import KDTree
+
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
@@ -20,12 +23,14 @@ from .open_sheet import open_sheet
 from .orientation import orient
 from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
-from .sides import Sides
+from .sides import Sides, patches
 from .signed import signed_mesh
 from .two_sides import two_sided
 from .zero_set import sharpened
 
 _MENDED = 2  # times, since holes may show where scraps are gone
+_SHORT = 1 / 6  # of the grid's longest side; shorter lines of more than two faces may be chance
+_BESIDE = 1.5  # cells from such a line; borders there show that sheets were parted
 
 
 def single_layer(
@@ -75,14 +80,17 @@ def sheet_of_crossings(
     Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
     either side, and may have handles there; so it is taken only if the dual contour, which shows the line, cannot be
     wound alike wherever it has two faces. Where sheets run side by side this may be torn, too; then it is one side of
-    the `cover`, a function that gives the double cover (see :func:`one_side`).
+    the `cover`, a function that gives the double cover (see :func:`one_side`). Creases may look like sheets that meet
+    for some cells; so what lies between two sides is taken in place of a dual contour all of whose lines are short,
+    too, if it is wound alike, and has no such lines and no borders in their place.
 
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress = Progress.of(progress)
     found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
     sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
-    if not (unoriented and crossings.normal.any()):
+    chance = [] if crossings.side_by_side else _short_lines(sheet, grid)
+    if not (crossings.normal.any() and (unoriented or len(chance))):
         return sheet, unoriented
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
     if signed is None:
@@ -90,7 +98,30 @@ def sheet_of_crossings(
     if crossings.side_by_side:
         return _finished(one_side(cover(), signed, surface, grid), surface, grid, Progress())
     found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
-    return _finished(found, surface, grid, progress.part(0.9, 1.0))
+    found, left = _finished(found, surface, grid, progress.part(0.9, 1.0))
+    if unoriented or not (left or _parts_at(chance, found, grid.spacing)):
+        return found, left
+    return sheet, unoriented
+
+
+def _short_lines(sheet, grid):
+    """Middles of the edges of more than two faces, (e,3), if all are in short lines; none else."""
+    edges, count = sheet.edge_counts()
+    ends = sheet.vertices[edges[count > 2]]
+    middle = ends.mean(axis=1)
+    line = patches(middle, grid)
+    for number in range(line.max(initial=-1) + 1):
+        extent = np.ptp(ends[line == number].reshape(-1, 3), axis=0)
+        if np.linalg.norm(extent) > _SHORT * max(grid.shape) * grid.spacing:
+            return middle[:0]
+    return middle
+
+
+def _parts_at(lines, sheet, cell):
+    """Whether a sheet has edges of more than two faces anywhere, or of one face at lines (e,3)."""
+    edges, count = sheet.edge_counts()
+    border = sheet.vertices[edges[count == 1]].reshape(-1, 3)
+    return (count > 2).any() or (len(border) and (KDTree(border).query(lines)[0] < _BESIDE * cell).any())
 
 
 def _finished(mesh, surface, grid, progress):

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from core import Settings, reconstruct
 from core.points import local_spacing
-from core.surface.misfit import askew
+from core.surface import misfit
 from tests import shapes
 
 
@@ -250,6 +250,39 @@ def test_a_closed_surface_with_an_inward_crease_stays_one_manifold():
     assert run.report["warnings"] == []
 
 
+def cones(n, seed, slope=4.0, radius=0.4):
+    """A terrain: a square of side 2 with three cones on it, sampled evenly at random."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(-1, 1, (3 * n, 2))
+    high = radius - np.linalg.norm(x[:, None] - [[-0.4, -0.3], [0.4, -0.2], [0, 0.45]], axis=2).min(axis=1)
+    kept = rng.random(3 * n) < np.where(high > 0, 1, 1 / np.hypot(1, slope))
+    return np.column_stack([x, slope * np.maximum(high, 0)])[kept][:n]
+
+
+@pytest.mark.parametrize(("n", "seed"), [(4000, 2), (8000, 0)])
+def test_a_terrain_with_a_sharp_fold_stays_one_manifold(n, seed):
+    """At a few places the fold at the foot of its cones looked like sheets that meet: there were lines of three faces,
+    up to 12 cells long."""
+    run = single(cones(n, seed), resolution=96, outliers=False)
+    assert run.sheet.edge_counts()[1].max() == 2
+    assert run.report["meshes"]["single"]["borders"] == 1
+    assert run.report["warnings"] == []
+
+
+def test_a_small_fin_is_no_chance():
+    """The line where it meets a sheet is as short as at such folds, but a surface with two sides is parted there."""
+    rng = np.random.default_rng(0)
+    sheet, fin = rng.uniform(-1, 1, (8000, 2)), rng.uniform([-0.13, 0], [0.13, 0.26], (140, 2))
+    fin = np.column_stack([fin[:, 0], np.zeros(140), fin[:, 1]])
+    run = single(np.concatenate([np.column_stack([sheet, np.zeros(8000)]), fin]), resolution=128)
+    h = run.field.spacing
+    edges, count = run.sheet.edge_counts()
+    line = run.sheet.vertices[edges[count > 2]].reshape(-1, 3)
+    assert 8 * h < np.ptp(line[:, 0]) < 21 * h
+    assert np.abs(line[:, 1:]).max() < 2 * h
+    assert misfit.distances(run.sheet, fin).max() < 0.5 * h
+
+
 @pytest.mark.parametrize("band", [None, 4.0])
 def test_where_sheets_run_closer_than_cells_the_double_cover_is_kept(band):
     """A ball pressed flat, .8 cells thick: as a single layer it had 140 edges of three faces and more, and holes."""
@@ -277,7 +310,7 @@ def test_a_single_layer_that_samples_are_near_but_that_runs_to_and_fro_is_torn()
     run = reconstruct(points, Settings(resolution=48, surface="both", denoise=0))
     np.testing.assert_array_equal(run.sheet.vertices, run.surface.vertices)
     assert any("the double cover is in its place" in warning for warning in run.report["warnings"])
-    assert askew(run.sheet, KDTree(run.points), run.normals) < 0.1
+    assert misfit.askew(run.sheet, KDTree(run.points), run.normals) < 0.1
 
 
 def test_where_points_are_too_few_for_a_single_layer_no_finer_grid_is_advised():
