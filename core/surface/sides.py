@@ -267,3 +267,11 @@ def patches(middle: np.ndarray, grid: Grid, reach: float = _ADJACENT) -> np.ndar
         return np.empty(0, np.int64)
     pairs = KDTree(middle).query_pairs(reach * grid.spacing, output_type="ndarray")
     return connected_components(symmetric(np.ones(len(pairs), bool), *pairs.T, len(middle)), directed=False)[1]
+
+
+def patch_lengths(patch: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Diagonals of the boxes around the places (m,3) of each patch, which have its number, (m,); one for each patch."""
+    order = np.argsort(patch, kind="stable")
+    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
+    extent = np.maximum.reduceat(place[order], first) - np.minimum.reduceat(place[order], first)
+    return np.linalg.norm(extent, axis=1)

@@ -23,14 +23,13 @@ from .open_sheet import open_sheet
 from .orientation import orient
 from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
-from .sides import Sides, patches
+from .sides import Sides, patch_lengths, patches
 from .signed import signed_mesh
-from .two_sides import two_sided
+from .two_sides import LONG, two_sided
 from .zero_set import sharpened
 
 _MENDED = 2  # times, since holes may show where scraps are gone
-_SHORT = 1 / 6  # of the grid's longest side; shorter lines of more than two faces may be chance
-_BESIDE = 1.5  # cells from such a line; borders there show that sheets were parted
+_BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
 
 
 def single_layer(
@@ -89,8 +88,10 @@ def sheet_of_crossings(
     progress = Progress.of(progress)
     found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
     sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
-    chance = [] if crossings.side_by_side else _short_lines(sheet, grid)
-    if not (crossings.normal.any() and (unoriented or len(chance))):
+    if not crossings.normal.any():
+        return sheet, unoriented
+    chance = [] if unoriented or crossings.side_by_side else _short_lines(sheet, grid)
+    if not (unoriented or len(chance)):
         return sheet, unoriented
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
     if signed is None:
@@ -99,9 +100,9 @@ def sheet_of_crossings(
         return _finished(one_side(cover(), signed, surface, grid), surface, grid, Progress())
     found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
     found, left = _finished(found, surface, grid, progress.part(0.9, 1.0))
-    if unoriented or not (left or _parts_at(chance, found, grid.spacing)):
-        return found, left
-    return sheet, unoriented
+    if len(chance) and (left or not _replaces(chance, found, grid.spacing)):
+        return sheet, unoriented
+    return found, left
 
 
 def _short_lines(sheet, grid):
@@ -109,19 +110,18 @@ def _short_lines(sheet, grid):
     edges, count = sheet.edge_counts()
     ends = sheet.vertices[edges[count > 2]]
     middle = ends.mean(axis=1)
-    line = patches(middle, grid)
-    for number in range(line.max(initial=-1) + 1):
-        extent = np.ptp(ends[line == number].reshape(-1, 3), axis=0)
-        if np.linalg.norm(extent) > _SHORT * max(grid.shape) * grid.spacing:
-            return middle[:0]
-    return middle
+    if not len(middle):
+        return middle
+    length = patch_lengths(np.repeat(patches(middle, grid), 2), ends.reshape(-1, 3))
+    short = length.max() <= LONG * max(grid.shape) * grid.spacing
+    return middle if short else middle[:0]
 
 
-def _parts_at(lines, sheet, cell):
-    """Whether a sheet has edges of more than two faces anywhere, or of one face at lines (e,3)."""
+def _replaces(lines, sheet, cell):
+    """Whether a sheet has no edges of more than two faces, and none of one face beside such lines (e,3) of another."""
     edges, count = sheet.edge_counts()
     border = sheet.vertices[edges[count == 1]].reshape(-1, 3)
-    return (count > 2).any() or (len(border) and (KDTree(border).query(lines)[0] < _BESIDE * cell).any())
+    return (count <= 2).all() and (KDTree(border).query(lines)[0] >= _BESIDE * cell).all()
 
 
 def _finished(mesh, surface, grid, progress):

@@ -41,7 +41,7 @@ class ThinParts:
 
     def _away(self, samples, x):
         """Cells from x (m,3) to the nearest of the samples, (m,); at most as far as lifts reach."""
-        if not len(samples):
+        if not len(samples) or not len(x):
             return np.full(len(x), _END)
         away = KDTree(samples).query(x, distance_upper_bound=_END * self.cell, workers=-1)[0]
         return np.minimum(away / self.cell, _END)

@@ -26,7 +26,7 @@ from ..linalg import row_dots, symmetric
 from ..lookup import is_among, numbered
 from ..progress import Progress
 from .crossings import Crossings
-from .sides import patches
+from .sides import patch_lengths, patches
 from .spreading import spread_signs
 
 _BEYOND = 3.0  # cells, distance that nodes out of the band count as
@@ -35,7 +35,7 @@ _SWEEPS = 12
 _LEAST = 0.1  # cells, least distance of nodes past a rim from the sheet continued
 _MOST = 0.02  # of the votes, more overruled ones mean that there are no two sides
 _SHORT = 2.0  # cells, shorter patches do not count
-_LONG = 1 / 6  # of the grid's longest side; as long a patch means that there are no two sides
+LONG = 1 / 6  # of the grid's longest side; a longer patch is no chance, but means that there are no two sides
 _STRIP = 400  # crossings for each squared cell of length; a patch parts a strip no longer for its width than this
 _CUT, _RING = 2, 6  # nodes around a patch that are taken out, and up to which the surface is looked at
 _PART = 0.25  # of that ring, what counts as a part of it
@@ -165,13 +165,12 @@ def _agree(votes, side, band, grid, progress):
     low, high = votes.low[overruled], votes.high[overruled]
     middle = 0.5 * (grid.positions(band.node[low]) + grid.positions(band.node[high]))
     patch = patches(middle, grid)
-    order = np.argsort(patch, kind="stable")
-    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
-    extent = np.maximum.reduceat(middle[order], first) - np.minimum.reduceat(middle[order], first)
-    length = np.linalg.norm(extent, axis=1) / grid.spacing
-    if length.max() > _LONG * max(grid.shape):
+    length = patch_lengths(patch, middle) / grid.spacing
+    if length.max() > LONG * max(grid.shape):
         return False
 
+    order = np.argsort(patch, kind="stable")
+    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
     graph = abs(votes.matrix(len(side)))
     part = connected_components(graph, directed=False)[1]
     crossed = np.bincount(part[votes.low], votes.sign < 0)[part[low[order[first]]]]

@@ -8,7 +8,7 @@ from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.progress import Progress
 from core.surface.crossings import Crossings
-from core.surface.sides import Sides, _numbered, _sides, find_sides, may_be_closed
+from core.surface.sides import Sides, _numbered, _sides, find_sides, may_be_closed, patch_lengths
 from tests import shapes
 
 GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
@@ -195,3 +195,8 @@ def test_signs():
     signed = Sides(inside, nowhere, np.empty(0, bool), nowhere, 0, GRID).sign(values)
     assert signed.dtype == np.float32
     np.testing.assert_array_equal(signed, np.where(inside, -1, 1))
+
+
+def test_patches_are_as_long_as_the_boxes_around_them():
+    place = np.array([[0.0, 0, 0], [5, 5, 5], [3, 0, 1], [1, 4, 0]])
+    np.testing.assert_array_equal(patch_lengths(np.array([0, 1, 0, 0]), place), [np.sqrt(9 + 16 + 1), 0])
