@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..linalg import cross, dots, lengths, symmetric
+from ..linalg import cross, lengths
+from .around_edges import order_around
 from .layers import HAIR
 from .mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
 
@@ -53,15 +54,11 @@ def _sides(sheet):
     other in cycles: from low end to low end one way, from high end to high end the other."""
     corner, corners = sheet.faces.reshape(-1), sheet.faces.size
     edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
+    order, several = order_around(sheet, edge, count), np.repeat(count, count)
     edge = edge.reshape(-1)
     here, after = np.arange(corners), _after(np.arange(corners))
     upwards = corner < corner[after]
     ends = np.stack([np.where(upwards, here, after), np.where(upwards, after, here)])
-    order, several = np.argsort(edge, kind="stable"), np.repeat(count, count)
-    line = np.flatnonzero(several > 2)
-    if len(line):
-        angle = _angles(sheet, *corner[[*ends[:, order[line]], _after(after[order[line]])]])
-        order[line] = order[line][np.lexsort((angle, edge[order[line]]))]
     following, last = np.roll(order, -1), np.cumsum(count) - 1
     following[last] = order[last - count + 1]
     ahead, back = corners * ~upwards[order], corners * upwards[following]
@@ -102,22 +99,6 @@ def _alike(*keys):
     found = np.zeros(len(order), bool)
     found[order[1:][same]] = found[order[:-1][same]] = True
     return found
-
-
-def _angles(sheet, low, high, third):
-    """How far faces with the vertices `low`, `high` and `third`, (m,) each, are turned about the edge from the first to
-    the second: (m,) radians, from a direction that is the same for all at this edge. The third vertex is taken in the
-    middle of itself and those beside it that are on no such edge, since faces are often folded there."""
-    edges, n = sheet.edge_counts()[0], len(sheet.vertices)
-    off = np.ones(n, bool)
-    off[low], off[high] = False, False
-    edges = edges[off[edges].all(axis=1)]
-    beside = symmetric(np.ones(len(edges)), *edges.T, n)[third]
-    start, middle = sheet.vertices[low], sheet.vertices[third] + beside @ sheet.vertices
-    middle /= 1 + np.diff(beside.indptr)[:, None]
-    along, to = (sheet.vertices[high] - start).T, (middle - start).T
-    across = cross(along, np.eye(3)[:, np.abs(along).argmin(axis=0)])
-    return np.arctan2(dots(cross(along, across), to), lengths(along) * dots(across, to))
 
 
 def _totals(x, sides, n):

@@ -13,7 +13,7 @@ from ..progress import Progress
 from ..settings import WITH_SIDES, Settings
 from .both_sides import both_sides
 from .crossings import Crossings, find_crossings
-from .double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
+from .double_cover import CLAMP, SPARSE, double_cover, level_for
 from .isosurface import need_quads
 from .meetings import Meetings, find_meetings
 from .mesh import Mesh
@@ -31,6 +31,7 @@ _SPARSEST = 5.0  # cells, median local spacing up to which single layers have th
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _THROUGH = 0.125  # of those, at least: sheets that pass through each other
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
+_PARTED = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Surfaces:
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
     needed = settings.band
-    if settings.surface in WITH_SIDES or (settings.surface == "double" and _even(local, grid)):
+    if settings.surface in WITH_SIDES or (settings.surface == "double" and _spacing_in_cells(local, grid) <= _SPARSEST):
         needed = max(needed, needed_band(local, grid))
     if settings.surface in ("double", "both", "single"):
         needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
@@ -139,7 +140,7 @@ class _Layers:
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one with handles; sheets side by
         side have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
-        if not _even(self.local, self.grid):
+        if _spacing_in_cells(self.local, self.grid) > _SPARSEST:
             return False
         if self.meetings.share <= _FEW:
             return True
@@ -150,28 +151,32 @@ class _Layers:
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
         surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
-        by side."""
+        by side, or if it has none and its borders are elsewhere."""
         if self.sheet is not None:
             return True
-        sheet, meetings = self.single[0], self.meetings
+        sheet = self.single[0]
         edges, count = sheet.edge_counts()
-        line = np.unique(edges[count > 2])
-        if not len(line):
-            return not self.crossings.normal.any() and not pieces_touch(sheet, self.grid.spacing)
-        sample = self.local.tree.query(sheet.vertices[line])[1]
-        return not meetings.side_by_side and meetings.at[sample].mean() >= _SEEN
+        border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
+        if len(line):
+            return not self.meetings.side_by_side and self._at_meetings(sheet.vertices[line]) >= _SEEN
+        if pieces_touch(sheet, self.grid.spacing):
+            return False
+        return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _PARTED
+
+    def _at_meetings(self, places):
+        """The share of places (m,3), at least one, whose nearest samples are where sheets meet."""
+        return self.meetings.at[self.local.tree.query(places)[1]].mean()
 
 
-def _even(local, grid):
-    """Whether samples are neither so dense that chords are most of the error, of which two layers extracted apart have
-    less, nor so sparse that a single layer may have handles."""
-    return DENSE <= np.median(local.spacing) / grid.spacing <= _SPARSEST
+def _spacing_in_cells(local, grid):
+    """The median local spacing."""
+    return float(np.median(local.spacing)) / grid.spacing
 
 
 def _said_of_torn(local, grid):
     """Why there is a double cover in place of a single layer, and what helps: no finer grid where points lie many cells
     apart."""
-    cells = np.median(local.spacing) / grid.spacing
+    cells = _spacing_in_cells(local, grid)
     if cells > SPARSE:
         return (
             f"points {cells:.2g} cells apart are too few to tell sheets apart, where a single layer is torn: the "
@@ -190,8 +195,8 @@ def extract_surfaces(
     :func:`band_for` says, and the nodes near the surface.
 
     The double cover is both sides of the single layer, see :mod:`.both_sides`, unless sheets pass through each other or
-    run side by side, or meet where samples do not show it, or samples are sparse or very dense; then it is extracted at
-    an offset, see :mod:`.double_cover`.
+    run side by side, or meet where samples do not show it, or samples are sparse; then it is extracted at an offset,
+    see :mod:`.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

@@ -30,6 +30,7 @@ from .zero_set import sharpened
 
 _MENDED = 2  # times, since holes may show where scraps are gone
 _BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
+_PARTED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
 
 
 def single_layer(
@@ -78,10 +79,11 @@ def sheet_of_crossings(
 
     Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
     either side, and may have handles there; so it is taken only if the dual contour, which shows the line, cannot be
-    wound alike wherever it has two faces. Where sheets run side by side this may be torn, too; then it is one side of
-    the `cover`, a function that gives the double cover (see :func:`one_side`). Creases may look like sheets that meet
-    for some cells; so what lies between two sides is taken in place of a dual contour all of whose lines are short,
-    too, if it is wound alike, and has no such lines and no borders in their place.
+    wound alike wherever it has two faces, and does not end along the line, as where sheets meet. Where sheets run side
+    by side this may be torn, too; then it is one side of the `cover`, a function that gives the double cover (see
+    :func:`one_side`). Creases may look like sheets that meet for some cells; so what lies between two sides is taken in
+    place of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines and no
+    borders in their place.
 
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
@@ -90,8 +92,9 @@ def sheet_of_crossings(
     sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
     if not crossings.normal.any():
         return sheet, unoriented
-    chance = [] if unoriented or crossings.side_by_side else _short_lines(sheet, grid)
-    if not (unoriented or len(chance)):
+    lines = _lines(sheet)
+    chance = not (unoriented or crossings.side_by_side) and _are_short(lines, grid)
+    if not (unoriented or chance):
         return sheet, unoriented
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
     if signed is None:
@@ -100,28 +103,30 @@ def sheet_of_crossings(
         return _finished(one_side(cover(), signed, surface, grid), surface, grid, Progress())
     found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
     found, left = _finished(found, surface, grid, progress.part(0.9, 1.0))
-    if len(chance) and (left or not _replaces(chance, found, grid.spacing)):
-        return sheet, unoriented
-    return found, left
+    parted = _borders_beside(lines, found, grid.spacing)
+    replaces = not (left or parted or len(_lines(found))) if chance else parted <= _PARTED * len(lines)
+    return (found, left) if replaces else (sheet, unoriented)
 
 
-def _short_lines(sheet, grid):
-    """Middles of the edges of more than two faces, (e,3), if all are in short lines; none else."""
+def _lines(sheet):
+    """Both ends of the edges of more than two faces, (e,2,3)."""
     edges, count = sheet.edge_counts()
-    ends = sheet.vertices[edges[count > 2]]
-    middle = ends.mean(axis=1)
-    if not len(middle):
-        return middle
-    length = patch_lengths(np.repeat(patches(middle, grid), 2), ends.reshape(-1, 3))
-    short = length.max() <= LONG * max(grid.shape) * grid.spacing
-    return middle if short else middle[:0]
+    return sheet.vertices[edges[count > 2]]
 
 
-def _replaces(lines, sheet, cell):
-    """Whether a sheet has no edges of more than two faces, and none of one face beside such lines (e,3) of another."""
+def _are_short(lines, grid):
+    """Whether there are lines of edges (e,2,3), and all of them are short."""
+    if not len(lines):
+        return False
+    length = patch_lengths(np.repeat(patches(lines.mean(axis=1), grid), 2), lines.reshape(-1, 3))
+    return length.max() <= LONG * max(grid.shape) * grid.spacing
+
+
+def _borders_beside(lines, sheet, cell):
+    """How many edges of one face a sheet has beside the lines of edges (e,2,3) of another."""
     edges, count = sheet.edge_counts()
-    border = sheet.vertices[edges[count == 1]].reshape(-1, 3)
-    return (count <= 2).all() and (KDTree(border).query(lines)[0] >= _BESIDE * cell).all()
+    border = sheet.vertices[edges[count == 1]].mean(axis=1)
+    return int((KDTree(lines.mean(axis=1)).query(border)[0] < _BESIDE * cell).sum())
 
 
 def _finished(mesh, surface, grid, progress):

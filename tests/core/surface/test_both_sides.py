@@ -213,6 +213,23 @@ def test_a_fold_beside_a_line_is_no_other_order_of_the_sheets():
     assert shapes.euler(cover) == 2
 
 
+@pytest.mark.parametrize("turned", [(), (1,), (0, 2)])
+@pytest.mark.parametrize("length", [12, 30])
+def test_a_stretch_of_folds_is_no_other_order_of_the_sheets(turned, length):
+    """A third of a line, along which faces of the first page lie beyond the second one."""
+    pages = strip(length, 1), strip(length, 1), strip(length, 1)
+    places, faces = [], []
+    for number, (page, turn) in enumerate(zip(pages, np.radians([0, 30, 180]), strict=True)):
+        along, out = page.vertices[:, 0], page.vertices[:, 1]
+        turn = np.where((number == 0) & (along > length / 3) & (along < 2 * length / 3), np.radians(50), turn)
+        places.append(np.column_stack([out * np.cos(turn), out * np.sin(turn), along]))
+        faces.append((page.faces[:, ::-1] if number in turned else page.faces) + len(page.vertices) * number)
+    vertices, row = np.unique(np.concatenate(places).round(9), axis=0, return_inverse=True)
+    cover = both_sides(Mesh(vertices, row.reshape(-1)[np.concatenate(faces)].astype(np.int32)), CELL)
+    assert is_closed_manifold(cover)
+    assert shapes.euler(cover) == 2
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_whatever_the_sheet_the_cover_is_manifold(seed):
     """Of triangles that share vertices at random, many of them at an edge."""
@@ -235,17 +252,58 @@ def test_whatever_the_sheet_the_cover_is_manifold(seed):
         (leaves(2400, [0, 120, 240]), False),
         (shapes.moebius(1500), True),
         (shapes.scattered_sphere(150), False),
-        (shapes.sphere(20_000), False),
+        (shapes.sphere(20_000), True),
         (slab(1500), True),
         (figure_eight(3000), False),
     ],
     ids=["torus", "disc", "junction", "wedge", "Y", "moebius", "sparse", "dense", "close walls", "crossed"],
 )
 def test_a_run_covers_the_single_layer_where_that_is_the_whole_surface(points, same):
-    """It is neither sparse nor dense, does not pass through itself, and where sheets meet they do not run side by side
+    """It is not sparse, does not pass through itself, and where sheets meet they do not run side by side
     and samples show that they meet, which those of sheets at the same angles to each other do not."""
     run = reconstruct(points, Settings(resolution=48, surface="both"))
     assert is_of_sheet(run) == same
+
+
+def test_dense_sheets_hardly_more_than_a_cell_apart_are_not_joined():
+    ball, gap = shapes.scattered_sphere(4000), 0.15
+    run = reconstruct(np.concatenate([ball - [1 + gap / 2, 0, 0], ball * [-1, 1, 1] + [1 + gap / 2, 0, 0]]))
+    run = reconstruct(run.points, Settings(resolution=48))
+    assert np.median(KDTree(run.points).query(run.points, k=2)[0][:, 1]) < gap / 4
+    assert gap < 1.4 * run.field.spacing
+    assert [shapes.euler(part) for part in shapes.components(run.surface)] == [2, 2, 2, 2]
+
+
+def house(seed, ground_below):
+    """Walls and a flat roof on a square ground, which goes on inside or does not."""
+    random, n, side, height = np.random.default_rng(seed), 3000, 0.25, 0.3
+    ground = random.uniform(-0.3, 0.3, (int(0.36 * n), 2))
+    inside = (np.abs(ground) < side / 2).all(axis=1)
+    roof = random.uniform(-side / 2, side / 2, (int(side**2 * n), 2))
+    along, up = random.uniform(-side / 2, side / 2, (4, 225)), random.uniform(0, height, (4, 225))
+    far = np.full(225, side / 2)
+    walls = [
+        np.column_stack([*pair, z])
+        for *pair, z in zip([far, -far, along[2], along[3]], [along[0], along[1], far, -far], up, strict=True)
+    ]
+    level = [np.column_stack([x, np.full(len(x), z)]) for x, z in ((ground[ground_below | ~inside], 0), (roof, height))]
+    return np.concatenate([*walls, *level])
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_the_cover_of_a_house_has_an_inside_and_an_outside(seed):
+    """At the corners of the walls faces are folded, and angles of single ones would let a wall pass the ground."""
+    run = reconstruct(house(seed, True), Settings(resolution=48, surface="both"))
+    assert (run.sheet.edge_counts()[1] > 2).any()
+    assert [shapes.euler(part) for part in shapes.components(run.surface)] == [2, 2]
+    assert is_of_sheet(run)
+
+
+def test_walls_on_a_ground_that_ends_there_have_the_cover_of_one_sheet():
+    """Though they look like sheets that meet to samples on either side of the crease."""
+    run = reconstruct(house(0, False), Settings(resolution=48, surface="both"))
+    assert is_of_sheet(run)
+    assert shapes.euler(run.surface) == 2
 
 
 def test_a_run_leaves_a_torn_sheet_alone(monkeypatch):
