@@ -12,8 +12,10 @@ from .errors import MemoryBudgetError
 from .field.grid import Grid
 from .linalg import row_dots
 from .parallel import cores
+from .points import MINIMUM_SAMPLES
 from .settings import BESIDE_OFFSET, WITH_SIDES, Settings
 
+_CGROUP = Path("/sys/fs/cgroup")
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 _BAND = 4.0  # cells, the band that is advised at least
 
@@ -89,10 +91,12 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
         band = _fitting_band(len(spacing), area, limit, settings)
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
-    elif len(spacing) > (fitting := _fitting_samples(limit, settings)):
+    elif len(spacing) <= (fitting := _fitting_samples(limit, settings)):
+        remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
+    elif fitting >= MINIMUM_SAMPLES:
         remedy = f"thin the {len(spacing)} points to {fitting} or fewer, or raise memory_limit"
     else:
-        remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
+        remedy = "raise memory_limit"
     raise MemoryBudgetError(
         f"resolution {settings.resolution} needs about {estimate.memory_mb:.0f} MiB; "
         f"{limit:.0f} MiB may be used; {remedy}"
@@ -114,7 +118,7 @@ def free_memory_mb() -> float:
 def _memory(samples, area, nodes, settings):
     """MiB of a run over a surface of `area` squared cells: of its most costly stage."""
     least, each = _by_samples(settings)
-    diagram, by_cores = least + each * samples, _CORE * max(0, cores() - 2)
+    diagram, by_cores = least + each * samples, _by_cores()
     if settings.band is not None:
         kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
         return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
@@ -122,6 +126,11 @@ def _memory(samples, area, nodes, settings):
     field = _MEMORY["field"] + node * nodes
     meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _MESHES[settings.surface] * area
     return by_cores + max(diagram, field, meshes)
+
+
+def _by_cores():
+    """MiB that all stages take for the cores there are."""
+    return _CORE * max(0, cores() - 2)
 
 
 def _by_samples(settings):
@@ -134,11 +143,11 @@ def _by_samples(settings):
 def _fitting_samples(limit, settings):
     """How many samples normals can be found of within `limit` MiB."""
     least, each = _by_samples(settings)
-    return max(0, int((limit - least) / each))
+    return max(0, int((limit - _by_cores() - least) / each))
 
 
 def _memory_at(resolution, samples, area, grid, settings):
-    """The same at another resolution than that of the grid."""
+    """MiB of a run at another resolution than that of the grid."""
     ratio = resolution / settings.resolution
     nodes = float(np.prod(np.ceil((np.array(grid.shape) - 1) * ratio) + 2))
     return _memory(samples, area * ratio**2, nodes, settings)
@@ -174,13 +183,15 @@ def _linux_available():
 
 
 def _container_left():
-    """MiB left in the control group (version 2 or 1), infinite where there is none."""
-    folders = {"/sys/fs/cgroup": ("memory.max", "memory.current")}
-    folders["/sys/fs/cgroup/memory"] = ("memory.limit_in_bytes", "memory.usage_in_bytes")
-    for folder, (limit, used) in folders.items():
-        limit, used = Path(folder, limit), Path(folder, used)
+    """MiB left in the control group (version 2 or 1), infinite where there is none. Of what it uses, file pages not
+    touched for a while are given up when others are asked for."""
+    version_2 = _CGROUP, "memory.max", "memory.current", "inactive_file"
+    version_1 = _CGROUP / "memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"
+    for folder, *files, given_up in (version_2, version_1):
+        limit, used, stat = (folder / name for name in (*files, "memory.stat"))
         if limit.exists() and used.exists() and limit.read_text().strip() != "max":
-            return (int(limit.read_text()) - int(used.read_text())) / 2**20
+            pages = dict(line.split() for line in stat.read_text().splitlines()) if stat.exists() else {}
+            return (int(limit.read_text()) - int(used.read_text()) + int(pages.get(given_up, 0))) / 2**20
     return float("inf")
 
 

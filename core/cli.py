@@ -3,6 +3,7 @@
 import argparse
 import signal
 import sys
+import threading
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
@@ -70,7 +71,8 @@ number, with scan_ before its name where it has one of those two.
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) and return the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    in_main = threading.current_thread() is threading.main_thread()  # other threads cannot set handlers
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main else None
     try:
         given = _parser().parse_args(arguments)
         given.run(given)
@@ -90,7 +92,8 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         return _fail(f"{error.filename}: {error.strerror}; see that it is there and yours", BAD_INPUT, arguments)
     finally:
-        signal.signal(signal.SIGTERM, previous)
+        if in_main:
+            signal.signal(signal.SIGTERM, previous)
 
 
 def _fail(error, status, arguments):

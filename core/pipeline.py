@@ -44,7 +44,7 @@ def reconstruct(
     constraints : (indices (k,), axes (k,3)), normals to hold fixed at rows of `points`, or None
     progress    : callback (fraction, stage) -> bool or None; False cancels
     normals     : (axes (n,3), confidence (n,)) of all points, as an earlier run found them, or None; with them the
-                  cleaning and the search for normals are left out, and constraints do not matter
+                  cleaning and the search for normals are left out, and constraints are checked alone
 
     Example
     -------
@@ -58,9 +58,9 @@ def reconstruct(
 
     Raises :class:`InputError` for points or constraints that cannot be used and for the signed surface of a shape that
     is not closed, :class:`MemoryBudgetError` where the run would need more memory than it may have, once the points are
-    cleaned, :class:`SettingsError` for a device that is not there and for grid diffusion over too many nodes,
-    :class:`MissingDependency` where no library that extracts iso-surfaces is found, :class:`Cancelled` where `progress`
-    says so.
+    cleaned, :class:`SettingsError` where NumPy is asked for on a GPU and where the grid cannot hold the diffusion,
+    :class:`MissingDependency` where no library that extracts iso-surfaces is found, or no torch or GPU that was asked
+    for, :class:`Cancelled` where `progress` says so.
     """
     return watched(partial(_reconstruct, points, settings, constraints, normals), progress)
 

@@ -10,7 +10,6 @@ import numpy as np
 from ..core import pipeline
 from ..core.cleaning.clean import clean
 from ..core.errors import VADError
-from ..core.field.grid import fit_grid
 from ..core.field.integration import near_band
 from ..core.field.local_surface import fit_local_surface
 from ..core.io.report import report_json
@@ -157,13 +156,15 @@ def compute(task: Task, folder: Path, progress=None) -> Outcome:
     Raises :class:`VADError` for what the core refuses and where memory runs out.
     """
     try:
-        run = _extracted if task.volume else _reconstructed if task.until == ALL else _begun
-        return run(task, folder, Progress.of(progress))
+        progress = Progress.of(progress)
+        if task.volume:
+            return _extracted(task, progress)
+        return _reconstructed(task, folder, progress) if task.until == ALL else _begun(task, progress)
     except MemoryError as error:
         raise VADError("Out of memory: lower the resolution, or give fewer points") from error
 
 
-def _begun(task, folder, progress):
+def _begun(task, progress):
     """The first stages alone."""
     start = time.perf_counter()
     share = 1.0 if task.until == CLEANING else 0.5
@@ -227,14 +228,14 @@ def _reconstructed(task, folder, progress):
     )
 
 
-def _extracted(task, folder, progress):
+def _extracted(task, progress):
     """The surface alone, from the field in the task's volume; the report tells of what was done here only. How far off
     vertices are is measured on the local surface itself, not interpolated in the grid."""
     start, settings = time.perf_counter(), task.settings
     progress.part(0.0, 0.0, "points")(0.0)
     samples = prepare_samples(task.points)
     normals, confidence = known_normals(task.known, len(task.points), samples.source_index)
-    grid, spacing = fit_grid(samples.points, settings.resolution), local_spacing(samples.points)
+    grid, spacing = stored_field.grid_of(task.volume, task.origin, samples), local_spacing(samples.points)
     values = stored_field.distances(task.volume, grid.shape) / np.float32(samples.scale)
     part = progress.part(0.0, 0.2, "surface")
     local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)

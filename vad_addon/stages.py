@@ -33,9 +33,7 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         max=1.0,
         options={"SKIP_SAVE"},
     )
-    outliers: bpy.props.BoolProperty(
-        name="Outliers", description="Drop stray points far from any surface", default=True
-    )
+    outliers: setting_property(options()["outliers"], options={"SKIP_SAVE"})
 
     def instant(self, task):
         return len(task.points) <= 3000
@@ -45,7 +43,8 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         stored = context.scene.vad
         if not self.properties.is_property_set("strength") and settings_from(stored).denoise not in {"auto", 0.0}:
             self.strength = settings_from(stored).denoise
-        settings = settings_from(stored, denoise=self.strength, outliers=self.outliers)
+        outliers = taken_over(stored, self.properties, ["outliers"])
+        settings = settings_from(stored, denoise=self.strength, **outliers)
         return Task(self._source.points, settings, until=CLEANING)
 
     def deliver(self, context, scene, found):

@@ -21,10 +21,10 @@ _SWEEPS = 20  # more change the median confidence by less than .0005 where it is
 _MIDDLE = 100  # of these, those whose neighbours are all there
 
 
-def looks_noisy(points, spacing, seed: int = 0) -> bool:
+def looks_noisy(points, spacing) -> bool:
     """Whether samples (n,3) with local spacing (n,) are as far off quadrics as noisy ones are; quick, and less
     sure than :func:`noisy_samples`, which asks the normals as well."""
-    return len(points) >= MINIMUM_SAMPLES and roughness(points, spacing, seed, Progress()).whole
+    return len(points) >= MINIMUM_SAMPLES and roughness(points, spacing, 0, Progress()).whole
 
 
 def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:

@@ -23,7 +23,7 @@ class Blocks:
 
     shape  : (nx,ny,nz), nodes of the grid
     slot   : (bx,by,bz) int32, which of `stored` holds a block, -1 where it is constant; rows of `stored` are in C order
-    outer  : (bx,by,bz), the constants
+    outer  : (bx,by,bz), the constants; of a stored block what it was filled with at first
     stored : (b,8,8,8); entries past the grid's last nodes mean nothing
     """
 
@@ -40,9 +40,10 @@ class Blocks:
     def at(self, node: np.ndarray) -> np.ndarray:
         """Values at nodes given by their index in the flattened (C order) grid, any shape of int64."""
         block, within = _split(node, self.shape, self.slot.shape)
-        slot = self.slot.reshape(-1)[block]
-        found = self.stored.reshape(-1)[_NODES * slot + within] if len(self.stored) else np.empty(node.shape)
-        return np.where(slot >= 0, found, self.outer.reshape(-1)[block])
+        slot, constant = self.slot.reshape(-1)[block].astype(np.int64), self.outer.reshape(-1)[block]
+        if not len(self.stored):
+            return constant
+        return np.where(slot >= 0, self.stored.reshape(-1)[_NODES * slot + within], constant)
 
     def map(self, function: Callable, *others: "Blocks") -> "Blocks":
         """`function` of the values here and of those of `others`, which store the same blocks."""
@@ -58,6 +59,13 @@ class Blocks:
         at = self.corners()[:, :, None] + np.arange(SIDE)
         fits = (at >= margin) & (at < np.array(self.shape)[:, None] - margin)
         return fits[:, 0, :, None, None] & fits[:, 1, None, :, None] & fits[:, 2, None, None, :]
+
+    def at_sides(self, rows: slice) -> list[np.ndarray]:
+        """Which entries of some stored blocks are at the sides of the box along each axis: bool arrays that broadcast
+        to (s,8,8,8)."""
+        at = self.corners()[rows, :, None] + np.arange(SIDE)
+        side = (at == 0) | (at == np.array(self.shape)[:, None] - 1)
+        return [side[:, 0, :, None, None], side[:, 1, None, :, None], side[:, 2, None, None, :]]
 
     def nodes(self, chosen: np.ndarray) -> np.ndarray:
         """Flat indices, ascending, of the stored nodes marked in `chosen`, (b,8,8,8) bool, false outside the box."""
@@ -85,7 +93,7 @@ class Blocks:
         varied = (self.stored != self.stored[:, :1, :1, :1]).any(axis=(1, 2, 3))
         slot, outer = np.full_like(self.slot, -1), self.outer.copy()
         held = self.slot >= 0
-        outer[held] = self.stored[:, 0, 0, 0]
+        outer[held] = np.where(varied, outer[held], self.stored[:, 0, 0, 0])
         slot[held] = np.where(varied, np.cumsum(varied) - 1, -1)
         return replace(self, slot=slot, outer=outer, stored=self.stored[varied])
 
@@ -117,8 +125,8 @@ def table_shape(shape) -> tuple[int, int, int]:
 
 
 def node_gradient(values: "np.ndarray | Blocks", spacing: float) -> "np.ndarray | Blocks":
-    """Central differences of float32 values at every node, the last axis x, y, z. In Blocks zero at nodes with a
-    neighbour that has the value of a constant block or more."""
+    """Central differences of float32 values at every node, the last axis x, y, z; one-sided at the sides of the box. In
+    Blocks zero at nodes with a neighbour that has the value of a constant block or more."""
     if isinstance(values, np.ndarray):
         return np.stack(np.gradient(values, np.float32(spacing)), axis=-1)
     slopes = np.empty((*values.stored.shape, 3), np.float32)
@@ -126,8 +134,9 @@ def node_gradient(values: "np.ndarray | Blocks", spacing: float) -> "np.ndarray 
     limit = np.abs(values.outer).max()
     for rows, around in values.padded():
         known = np.ones(around[middle].shape, bool)
-        for axis in (1, 2, 3):
-            slopes[rows, ..., axis - 1] = np.gradient(around, np.float32(spacing), axis=axis)[middle]
+        for axis, at_side in zip((1, 2, 3), values.at_sides(rows), strict=True):
+            slope = np.gradient(around, np.float32(spacing), axis=axis)[middle]
+            slopes[rows, ..., axis - 1] = np.where(at_side, 2 * slope, slope)  # half of it is to the same value again
             for shift in (-1, 1):
                 known &= np.abs(np.roll(around, shift, axis=axis)[middle]) < limit
         slopes[rows][~known] = 0

@@ -66,7 +66,7 @@ class Projection:
 class SheetFoot:
     """Where queries fall on one sheet each, continued past its rims.
 
-    tau    : (m,) float64, offset of the query along `axis`     axis    : (m,3) float64, unit normal of the sheet
+    tau    : (m,) float32, offset of the query along `axis`     axis    : (m,3) float64, unit normal of the sheet
     beyond : (m,) float32, how far past the sheet's rim         outward : (m,3) float32, the step past it
     member : (m,k) float32 in [0,1], how surely each sample near the query belongs to the sheet
     spread : (m,) how far the patches are off the foot, root mean square

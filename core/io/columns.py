@@ -25,7 +25,7 @@ def named_columns(path, names: list[str]) -> dict[str, int]:
             seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
             raise InputError(f"{path} has {len(names)} columns, named {seen}; name those of the coordinates x, y and z")
         return XYZ
-    if _COLOUR.keys() <= columns.keys():
+    if _COLOUR.keys() <= columns.keys() and not columns.keys() & set(COLOURS):
         columns = {_COLOUR.get(name, name): column for name, column in columns.items()}
     return {axis: columns.pop(axis) for axis in XYZ} | columns
 

@@ -24,8 +24,10 @@ def load_openvdb() -> ModuleType:
     """
     try:
         import openvdb
-    except ModuleNotFoundError:
-        return _load_from_bpy_wheel()
+    except ImportError as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "openvdb":
+            return _load_from_bpy_wheel()
+        raise MissingDependency(f"OpenVDB does not load ({error}); install it anew, or {_REMEDY}") from error
     return openvdb
 
 

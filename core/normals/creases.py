@@ -71,7 +71,7 @@ def _agreed(mirrors, normals, held):
 
 def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress):
     """The axes after those of samples beside creases are taken to one sheet's normal, and which these are; all have
-    their neighbours in `mirrors`. `agreed` (n,) holds for the others."""
+    their neighbours in `mirrors`. `agreed` (n,) holds for the others, and takes in place what these find."""
     normals, moved, here = normals.copy(), np.zeros(len(points), bool), np.unique(mirrors.site)
     changed = ~moved
     for _ in range(_ROUNDS):

@@ -22,6 +22,8 @@ class Mirrors:
 
     site, other, weight : (p,), a sample, one of its neighbours and that one's weight
     direction : (3,p) float64, unit vectors from the one to the other
+    gather    : sparse (n,p), takes the mean over the neighbours of each sample
+    alignment : (n,6), mean over the neighbours of each sample of the directions' d d^T
 
     Distances below a quarter of a local spacing count as that much. Two samples almost on top of each other would
     otherwise hear little but one another, and any two axes across their direction that mirror each other would stay as

@@ -110,8 +110,8 @@ def by_blocks(
     """What `make` makes of every side of the facets of a block, block by block, from the one with most points to the
     one with fewest; arguments as in `voronoi_facets`.
 
-    No facet is in two blocks. Qhull lets other threads run, so there are as many as there are processors; what comes
-    back does not depend on their number.
+    No facet is in two blocks. Qhull lets other threads run, so blocks are made by all cores; what comes back does not
+    depend on their number.
     """
     progress = Progress.of(progress)
     jitter = np.random.default_rng(seed).uniform(-1, 1, points.shape) * (_JITTER * spacing)[:, None]

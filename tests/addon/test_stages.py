@@ -73,6 +73,10 @@ def test_strength_and_outliers_are_obeyed(blender, scan, noisy):
     blender.ops.vad.denoise(strength=0.0, outliers=False)
     made = blender.context.view_layer.objects.active
     assert_allclose(positions(made), 2 * noisy + [10, 0, 0], atol=1e-5)
+    blender.context.view_layer.objects.active = scan
+    blender.context.scene.vad.outliers = False
+    blender.ops.vad.denoise(strength=0.0)
+    assert len(positions(blender.context.view_layer.objects.active)) == len(noisy)
 
 
 @pytest.mark.parametrize(("denoise", "share"), [("auto", 1), ("0", 1), ("0.5", 0.5)])
@@ -305,6 +309,22 @@ def test_the_worker_finds_the_same(extension, sphere, tmp_path, until):
         assert_array_equal(getattr(found, name), getattr(expected, name))
     assert (found.normals is None) == (until == "cleaning")
     assert found.surface is found.sheet is found.volume is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_stored_field_says_what_its_grid_is(extension, tmp_path, seed):
+    """Of boxes twice as long as wide the last node across is there or not as positions are rounded."""
+    outcome = extension("vad_addon.outcome")
+    points = np.random.default_rng(seed).uniform(-1, 1, (400, 3)) * [2, 1, 1]
+    points[:6] = [[-2, 0, 0], [2, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]]
+    settings = extension("core.settings").Settings(resolution=20, surface="none", outliers=False, denoise=0.0)
+    made = outcome.compute(outcome.Task(points / 3 + [5, 3, 7], settings), tmp_path)
+    stored = extension("vad_addon.stored_field")
+    for moved in (0, 1e-7, -1e-7):
+        samples = extension("core.points").prepare_samples(made.points + moved * (made.points > [5, 3, 7]))
+        grid = stored.grid_of(made.volume, made.origin, samples)
+        assert grid.shape == made.shape
+        assert grid.spacing * samples.scale == pytest.approx(made.cell, rel=1e-6)
 
 
 def test_a_task_reaches_the_worker_whole(extension, sphere, tmp_path):

@@ -151,6 +151,46 @@ def test_too_many_points_for_any_grid_are_named():
         check_budget(Estimate(1.0, 50_000.0, 1.0), spacing, grid, settings)
 
 
+@pytest.mark.parametrize("processors", [2, 8])
+def test_the_advice_to_thin_fits_on_any_number_of_cores(monkeypatch, processors):
+    monkeypatch.setattr("os.cpu_count", lambda: processors)
+    _, grid = cost(POINTS, 16)
+    settings = Settings(resolution=16, memory_limit=300)
+    with pytest.raises(MemoryBudgetError) as caught:
+        check_budget(Estimate(1.0, 1000.0, 1.0), np.full(200_000, 1e-4), grid, settings)
+    fitting = int(str(caught.value).split(" points to ")[1].split()[0])
+    assert estimate_cost(np.full(fitting, 1e-4), grid, settings).memory_mb == pytest.approx(300, abs=1)
+
+
+def test_no_points_are_advised_that_are_too_few():
+    _, grid = cost(POINTS, 16)
+    with pytest.raises(MemoryBudgetError, match=r"may be used; raise memory_limit$"):
+        check_budget(
+            Estimate(1.0, 1000.0, 1.0),
+            np.full(500, 0.1),
+            grid,
+            Settings(resolution=16, memory_limit=64, solver="energy"),
+        )
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_pages_of_files_that_a_container_can_give_up_are_free(monkeypatch, tmp_path, version):
+    folder = tmp_path / "memory" if version == 1 else tmp_path
+    folder.mkdir(exist_ok=True)
+    names = (
+        ("limit_in_bytes", "usage_in_bytes", "total_inactive_file")
+        if version == 1
+        else ("max", "current", "inactive_file")
+    )
+    for name, value in zip(names, (64, 48), strict=False):
+        (folder / f"memory.{name}").write_text(str(value << 20))
+    (folder / "memory.stat").write_text(f"anon 1\n{names[2]} {16 << 20}\n")
+    monkeypatch.setattr("core.budget._CGROUP", tmp_path)
+    monkeypatch.setattr("core.budget._linux_available", lambda: 1e9)
+    monkeypatch.setattr("sys.platform", "linux")
+    assert free_memory_mb() == 32
+
+
 def test_auto_is_seven_tenths_of_what_is_free(monkeypatch):
     estimate, grid = cost(POINTS, 64)
     monkeypatch.setattr("core.budget.free_memory_mb", lambda: estimate.memory_mb / 0.7 * 1.01)

@@ -3,6 +3,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -403,6 +404,15 @@ def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     assert running.returncode == 130
     assert err.count("\n") == 1
     assert os.listdir(tmp_path / "out") == []
+
+
+def test_a_thread_may_run_it(scan, capsys):
+    status = []
+    thread = threading.Thread(target=lambda: status.append(cli.main(["info", str(scan)])))
+    thread.start()
+    thread.join()
+    assert status == [0]
+    assert "points" in capsys.readouterr().out
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")

@@ -36,6 +36,14 @@ def test_without_both_the_remedy_is_named(fresh, monkeypatch):
         load_openvdb()
 
 
+def test_an_installed_module_that_does_not_load_says_why(fresh, monkeypatch, tmp_path):
+    (tmp_path / "openvdb.py").write_text("import a_library_that_is_missing")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "openvdb", raising=False)
+    with pytest.raises(MissingDependency, match="a_library_that_is_missing"):
+        load_openvdb()
+
+
 def test_a_module_that_does_not_load_says_why(fresh, monkeypatch, tmp_path):
     site = tmp_path / "bpy" / "5.0" / "python" / "lib" / "python3.11" / "site-packages"
     site.mkdir(parents=True)

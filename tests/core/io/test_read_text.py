@@ -157,6 +157,11 @@ def test_columns_of_one_name_or_of_none_in_ascii_are_told_apart(folder):
     }  # fmt: skip
 
 
+def test_letters_beside_colours_stay_what_they_are(folder):
+    attributes = read_scan(written(folder, "scan.csv", "x,y,z,r,g,b,red\n1,2,3,4,5,6,7"))[1]
+    assert {name: values.item() for name, values in attributes.items()} == {"r": 4, "g": 5, "b": 6, "red": 7}
+
+
 def test_a_table_of_words_is_refused(folder):
     assert "line 2 is 'anna,red,oslo'" in refusal(folder, "scan.csv", "name,colour,town\nanna,red,oslo\n")
     assert "line 2 is" in refusal(folder, "scan.txt", "Dear reader,\nthis is a letter\n")
