@@ -8,6 +8,7 @@ import numpy as np
 
 from .budget import check_budget, estimate_cost
 from .cleaning.clean import clean
+from .errors import SettingsError
 from .field.distance_field import BandedField, DistanceField
 from .field.grid import fit_grid
 from .field.integration import distance_field
@@ -66,6 +67,8 @@ def reconstruct(
 
 
 def _reconstruct(points, settings, constraints, normals, progress):
+    if not isinstance(settings, Settings):
+        raise SettingsError(f"settings are {settings!r}; give Settings(...), or nothing for the defaults")
     stages = _Stages()
     with stages("points"):
         samples = prepare_samples(points, progress.part(0.0, 0.01, "points")).in_spatial_order()
@@ -114,7 +117,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         },
         "cleaning": cleaning,
         "normals": solved,
-        "meshes": mesh_facts(surfaces, progress.part(0.99, 1.0)),
+        "meshes": mesh_facts(surfaces, progress.part(0.99, 1.0, "report")),
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
         "spacing": float(np.median(spacing)) * samples.scale,
         "seconds": stages.seconds,
@@ -122,7 +125,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "peak_memory_mb": peak_memory_mb(),
         "warnings": [*samples.warnings, *ignored, *large, *_too_coarse(spacing, grid), *surfaces.warnings],
     }
-    progress(1.0)
+    progress.part(0.0, 1.0, "report")(1.0)
     row = samples.given_order()
     near = replace(near, sample=np.argsort(row).astype(np.int32)[near.sample])
     return Reconstruction(

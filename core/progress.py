@@ -6,6 +6,8 @@ from queue import Empty, SimpleQueue
 from threading import Event, Thread
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from .errors import Cancelled
 
 ProgressCallback = Callable[[float, str], bool | None]
@@ -18,7 +20,7 @@ class Progress:
     """A slice of a progress bar, handed down to stages and their loops.
 
     Calling it reports a fraction in [0, 1] *of this slice*; the user's callback receives the fraction of the whole
-    run and the stage's name. A callback that returns ``False`` (exactly; ``None`` goes on) cancels the run.
+    run and the stage's name. A callback that returns ``False``, NumPy's too, cancels the run; ``None`` goes on.
 
     Example
     -------
@@ -64,7 +66,8 @@ class Progress:
         """Report; raises :class:`Cancelled` where the callback says so."""
         if self._callback is None:
             return
-        if self._callback(self._start + fraction * (self._stop - self._start), self._text) is False:
+        answer = self._callback(self._start + fraction * (self._stop - self._start), self._text)
+        if isinstance(answer, bool | np.bool_) and not answer:
             raise Cancelled(f"cancelled during '{self._text}'; nothing was written")
 
 

@@ -29,6 +29,7 @@ _CHUNK = 8192  # samples
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
 _WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
 _ASTRAY, _FEW = 0.01, 5  # share and number of samples off all wires above which they are strays: ends of wires are, too
+_AT_ITS_HEIGHT = 24, 6, 0.15  # neighbours; so many of them this close to its height, over their spacing, are a sheet
 _PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
 _MANY_PROUD = 0.00125  # share of such samples above which they are strays: corners have some
 _PEERS, _AS_SPARSE, _IN_LINE = 6, 0.5, 3  # nearest samples with this share of a sample's spacing; so many make a line
@@ -108,8 +109,8 @@ class _Surroundings:
         self.points = points
         self.spacing, self.thickness, off_plane, theirs = np.empty((4, n))
         self.neighbours, curve = np.empty((n, _NEIGHBOURS + 1), np.int64), np.empty(n, bool)
-        self.centre, self.along = np.empty((2, n, 3))
-        tree = KDTree(points)
+        self.centre, self.along, self.across = np.empty((3, n, 3))
+        self.tree = tree = KDTree(points)
 
         def look(part):
             distance, self.neighbours[part] = tree.query(points[part], k=_NEIGHBOURS + 1)
@@ -118,7 +119,7 @@ class _Surroundings:
             centre = group.mean(axis=1)
             group = group - centre[:, None]
             squared, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", group, group))
-            self.centre[part], self.along[part] = centre, axes[:, :, 2]
+            self.centre[part], self.along[part], self.across[part] = centre, axes[:, :, 2], axes[:, :, 0]
             extent = np.sqrt(np.maximum(squared, 0.0))
             size = np.maximum(np.linalg.norm(extent, axis=1), np.finfo(float).tiny)
             self.thickness[part] = extent[:, 0] / size
@@ -149,8 +150,18 @@ class _Surroundings:
         """Which of the samples `found` have so many times the largest of the median heights around each neighbour."""
         row = np.flatnonzero(found)
         theirs = np.median(height[self.neighbours[self.neighbours[row]]], axis=2).max(axis=1)
-        found[row] = height[row] > times * theirs
+        found[row] = (height[row] > times * theirs) & ~self._in_sheet(row)
         return found
+
+    def _in_sheet(self, row):
+        """Which of samples `row` (m,) lie in a sheet of their own close beside another one: samples around are at their
+        height above the flattest neighbourhood near them."""
+        count, fewest, off = _AT_ITS_HEIGHT
+        near = self.neighbours[row, 1:]
+        flattest = near[np.arange(len(row)), self.thickness[near].argmin(axis=1)]
+        around = self.tree.query(self.points[row], k=range(2, min(count, len(self.points)) + 1))[1]
+        height = np.einsum("mki,mi->mk", self.points[around] - self.points[row, None], self.across[flattest])
+        return (np.abs(height) < off * self.spacing[flattest, None]).sum(axis=1) >= fewest
 
     def scattered(self, progress):
         found = np.zeros(len(self.points), bool)

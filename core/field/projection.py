@@ -148,7 +148,8 @@ def membership(between, height, height_back) -> np.ndarray:
     between : (3,m,k) from the one to the others     height, height_back : (m,k) off its sheet and off theirs
     """
     off = _MEMBERSHIP * (height**2 + height_back**2) / np.maximum(dots(between, between), _TINY)
-    return np.exp(-(off**2))
+    with np.errstate(over="ignore"):  # no member by far
+        return np.exp(-(off**2))
 
 
 def _off_patches(near, anchor, between):

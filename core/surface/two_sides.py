@@ -10,7 +10,7 @@ A one-sided surface has no such state, nor have three sheets that meet in a line
 form a patch as long as the sheet is wide, or one that parts the surface around it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -29,6 +29,8 @@ from .crossings import Crossings
 from .sides import patch_lengths, patches
 from .spreading import spread_signs
 
+_NEAR_FOLD = 24  # samples around a place, among which the other sheet of a fold is looked for
+_SHARP, _FOLD = -0.1, 0.9  # cosines between normals into the wedge of a sharp fold, and size of those of others
 _BEYOND = 3.0  # cells, distance that nodes out of the band count as
 _ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 6, 300, 0.03, 1e-3
 _SWEEPS = 12
@@ -54,10 +56,12 @@ def two_sided(
 
     values : (nx,ny,nz) float32 or Blocks, unsigned distances; the result is alike
     """
-    votes = _votes(band, crossings)
-    sure = votes.sure()
-    progress(0.1)
     sample, height = _heights(band, surface, grid)
+    votes = _votes(band, crossings)
+    if not crossings.normal.any():
+        votes = votes.at_folds(surface, sample, grid.positions(band.node))
+    sure = votes.sure()
+    progress(0.2)
     side = _sides_of_nodes(votes, sure, sample, height, progress.part(0.2, 0.8))
     if not _agree(sure, side, band, grid, progress.part(0.8, 1.0)):
         return None
@@ -82,8 +86,33 @@ class _Votes:
         chosen = np.abs(self.sign) == 1
         return _Votes(self.low[chosen], self.high[chosen], self.sign[chosen])
 
+    def at_folds(self, surface: LocalSurface, sample: np.ndarray, x: np.ndarray) -> "_Votes":
+        """The same with other votes between nodes, which are at x (b,3) and go with samples (b,), beside sharp folds:
+        they are on one side if both are in the wedge, or none. There the steps to nodes turn from one sheet to the
+        other, and cells cannot tell."""
+        folded, inside = np.zeros((2, len(x)), bool)
+        node = np.flatnonzero(_in_wedges(surface, np.arange(surface.tree.n), surface.points)[0][sample])
+        folded[node], inside[node] = _in_wedges(surface, sample[node], x[node])
+        alike = np.where(inside[self.low] == inside[self.high], 1.0, -1.0) * np.abs(self.sign)
+        return replace(self, sign=np.where(folded[self.low] & folded[self.high], alike, self.sign))
+
     def matrix(self, n) -> csr_matrix:
         return symmetric(self.sign, self.low, self.high, n)
+
+
+def _in_wedges(surface, sample, x):
+    """Whether places (m,3) that go with some samples (m,) are near a sharp fold, where another sheet turns towards that
+    of the sample, (m,) bool, and whether they are in its wedge, beside either sheet where the other one is, (m,)."""
+    near = surface.tree.query(x, k=range(1, min(_NEAR_FOLD, surface.tree.n) + 1), workers=-1)[1]
+    own, theirs = surface.normals[sample, None], surface.normals[near]
+    step = surface.points[near] - surface.points[sample, None]
+    towards, back = np.sign(row_dots(step, own)), np.sign(-row_dots(step, theirs))
+    cosine = row_dots(own, theirs)
+    sharp = (towards * back * cosine < _SHARP) & (np.abs(cosine) < _FOLD)
+    at = np.arange(len(sample)), sharp.argmax(axis=1)
+    height = row_dots(x - surface.points[sample], own[:, 0]) * towards[at]
+    other = row_dots(x - surface.points[near[at]], theirs[at]) * back[at]
+    return sharp[at], (height > 0) & (other > 0)
 
 
 def _votes(band, crossings):

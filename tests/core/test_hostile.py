@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core import Settings, VADError, reconstruct
+from core import Settings, SettingsError, VADError, reconstruct
 from core.points import prepare_samples
 from tests import shapes
 
@@ -170,6 +170,19 @@ def test_a_far_outlier_does_not_coarsen_the_grid():
     assert result.field.spacing < 0.1
     assert result.report["cleaning"]["outliers"] == 1
     assert 1000 not in result.source_index
+
+
+def test_settings_that_are_none_are_refused():
+    for none in ({"resolution": 16}, None):
+        with pytest.raises(SettingsError, match=r"give Settings\(...\)"):
+            reconstruct(shapes.sphere(100), none)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("distance", [3e5, 1e6, 1e9])
+def test_objects_as_far_apart_as_numbers_reach(distance):
+    tori = np.vstack([shapes.torus(1500), shapes.torus(1500) + [distance, 0, 0]])
+    assert_sound(reconstruct(tori, Settings(resolution=RESOLUTION, outliers=False)), tori)
 
 
 def test_two_far_apart_objects_are_both_kept():

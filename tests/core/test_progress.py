@@ -37,9 +37,10 @@ def test_only_false_cancels(answer):
     Progress(lambda *_: answer).part(0, 1, "field")(0.5)
 
 
-def test_false_cancels_and_names_the_stage():
+@pytest.mark.parametrize("answer", [False, np.False_])
+def test_false_cancels_and_names_the_stage(answer):
     with pytest.raises(Cancelled, match=r"field.*nothing was written"):
-        Progress(lambda *_: False).part(0, 1, "field")(0.5)
+        Progress(lambda *_: answer).part(0, 1, "field")(0.5)
     assert issubclass(Cancelled, VADError)
 
 

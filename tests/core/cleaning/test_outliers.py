@@ -58,6 +58,14 @@ def test_scattered_strays_are_found(share, found):
     assert marked[~stray].mean() < 0.01
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("gap", [0.03, 0.045, 0.06])
+def test_sheets_a_spacing_or_two_apart_stay_whole(gap, seed):
+    """Samples in a gap of their own sheet have all their neighbours on the other one."""
+    x = np.random.default_rng(seed).uniform(-1, 1, (10_000, 2))
+    assert find_outliers(np.column_stack([x, np.repeat([0, gap], 5000)])).sum() <= 1
+
+
 def test_strays_beside_the_surface_are_found():
     rng = np.random.default_rng(1)
     points, stray = with_strays(shapes.scattered_sphere(250, seed=5) * (1 + rng.choice([-1, 1], (250, 1)) * 0.15))

@@ -99,6 +99,7 @@ def test_layers_of_a_double_cover_hardly_cross(points):
     assert crossed(reconstruct(points, Settings(resolution=48))) < 0.015
 
 
+@pytest.mark.usefixtures("at_offset")
 def test_samples_denser_than_the_cells_have_faces_astride():
     run = reconstruct(shapes.sphere(20_000), Settings(resolution=32))
     assert run.report["spacing"] < 0.6 * run.field.spacing

@@ -269,6 +269,44 @@ def test_a_terrain_with_a_sharp_fold_stays_one_manifold(n, seed):
     assert run.report["warnings"] == []
 
 
+def folded(angle, seed):
+    """Random points on two squares that meet in a line, so many degrees apart."""
+    x, y = np.random.default_rng(seed).random((2, 3000))
+    turn = np.radians(angle) * (np.arange(3000) % 2)
+    return np.stack([x * np.cos(turn), y, x * np.sin(turn)], axis=1)
+
+
+def prism(corners, count, seed):
+    """Random points on the walls over a polygon with these corners (c,2), open above and below."""
+    rng, along = np.random.default_rng(seed), np.roll(corners, -1, axis=0) - corners
+    length = np.linalg.norm(along, axis=1)
+    wall = rng.choice(len(corners), count, p=length / length.sum())
+    place = corners[wall] + rng.random((count, 1)) * along[wall]
+    return np.column_stack([place, rng.uniform(0, 2, count)])
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("angle", [60, 75])
+def test_an_open_sheet_with_a_sharp_fold_is_whole(angle, seed):
+    """Cells in the wedge cannot tell which edges are crossed: there were cracks, and lines of three faces."""
+    run = single(folded(angle, seed), resolution=96)
+    assert run.sheet.edge_counts()[1].max() == 2
+    assert run.report["meshes"]["single"]["borders"] == 1
+    assert shapes.euler(run.sheet) == 1
+    assert run.report["warnings"] == []
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("corners", "count"), [(3, 4000), (10, 8000)])
+def test_an_open_prism_with_sharp_edges_is_whole(corners, count, seed):
+    turn = 2 * np.pi * np.arange(corners) / corners
+    radius = np.where((corners == 10) & (np.arange(corners) % 2 == 1), 0.5, 1)
+    run = single(prism(np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1), count, seed), resolution=96)
+    assert run.sheet.edge_counts()[1].max() == 2
+    assert run.report["meshes"]["single"]["borders"] == 2
+    assert run.report["warnings"] == []
+
+
 def test_a_small_fin_is_no_chance():
     """The line where it meets a sheet is as short as at such folds, but a surface with two sides is parted there."""
     rng = np.random.default_rng(0)

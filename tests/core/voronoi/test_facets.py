@@ -82,6 +82,18 @@ def test_pairs_are_sorted_distinct_and_every_sample_has_some():
     assert len(np.unique(facets.pairs)) == 800
 
 
+def test_distances_of_very_different_sizes():
+    """A cone sampled alike at every scale; Qhull gives up its tetrahedra as they come."""
+    rng = np.random.default_rng(0)
+    radius, angle = 10 ** rng.uniform(-6, 0, 8000), rng.uniform(0, 2 * np.pi, 8000)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), radius], axis=1)
+    facets = voronoi_facets(points, local_spacing(points))
+    middle = np.flatnonzero((radius > 1e-5) & (radius < 0.5))
+    count = np.bincount(facets.pairs.reshape(-1), minlength=8000)[middle]
+    assert (count >= 3).mean() > 0.95
+    assert (facets.area > 0).all()
+
+
 def test_same_seed_same_bytes_and_another_seed_nearly_the_same():
     points = shapes.scattered_sphere(400)
     spacing = local_spacing(points)
