@@ -28,7 +28,7 @@ from .surface.quality import quad_quality, triangle_quality
 
 _COARSE = 0.1  # cells, median local spacing below which a warning says that the grid is too coarse for the points
 _FACTS = (
-    lambda mesh: {"borders": mesh.border_loops()},
+    lambda mesh: {"borders": mesh.border_loops(), "nonmanifold_edges": int((mesh.edge_counts()[1] > 2).sum())},
     lambda mesh: {"pieces": piece_count(mesh)},
     triangle_quality,
     quad_quality,

@@ -181,7 +181,9 @@ def test_settings_that_are_none_are_refused():
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("distance", [3e5, 1e6, 1e9])
 def test_objects_as_far_apart_as_numbers_reach(distance):
-    tori = np.vstack([shapes.torus(1500), shapes.torus(1500) + [distance, 0, 0]])
+    torus = shapes.torus(1500)
+    away = np.array([distance, 0, 0])
+    tori = np.vstack([torus, torus + away])
     assert_sound(reconstruct(tori, Settings(resolution=RESOLUTION, outliers=False)), tori)
 
 

@@ -118,7 +118,7 @@ class TestResult:
         assert report["counts"]["nodes"] == sphere_run.field.values.size
         mesh = sphere_run.surface
         counts = {"vertices": len(mesh.vertices), "faces": len(mesh.faces), "borders": 0}
-        counts |= {"pieces": 2, "pieces_dropped": 0}
+        counts |= {"pieces": 2, "pieces_dropped": 0, "nonmanifold_edges": 0}
         assert report["meshes"] == {"double": {**counts, **triangle_quality(mesh), **quad_quality(mesh)}}
         assert {"points", "normals", "field", "surface"} <= report["seconds"].keys()
         assert all(seconds >= 0 for seconds in report["seconds"].values())
