@@ -6,6 +6,9 @@ on two. As in :mod:`.sides` the least frustrated state is wanted (Kunegis et al.
 side is known, so it is the first eigenvector of the signed Laplacian, by inverse iteration from the orientations that
 the surest votes give along a spanning tree.
 
+In the wedges of sharp folds votes are often wrong. Where there are no sides, nodes there are told by the planes of both
+sheets, and the sides are looked for once more.
+
 A one-sided surface has no such state, nor have three sheets that meet in a line. There the votes that are overruled
 form a patch as long as the sheet is wide, or one that parts the surface around it.
 """
@@ -57,13 +60,14 @@ def two_sided(
     values : (nx,ny,nz) float32 or Blocks, unsigned distances; the result is alike
     """
     sample, height = _heights(band, surface, grid)
-    votes = _votes(band, crossings)
-    if not crossings.normal.any():
-        votes = votes.at_folds(surface, sample, grid.positions(band.node))
-    sure = votes.sure()
-    progress(0.2)
-    side = _sides_of_nodes(votes, sure, sample, height, progress.part(0.2, 0.8))
-    if not _agree(sure, side, band, grid, progress.part(0.8, 1.0)):
+    votes, progress = _votes(band, crossings), progress.part(0.1, 1.0)
+    side = _agreed_sides(votes, sample, height, band, grid, progress.part(0.0, 0.5))
+    if side is None and not crossings.normal.any():
+        folds = _Folds.of(surface, sample, grid.positions(band.node))
+        if folds.toward.any():
+            votes, height = folds.votes(votes), folds.heights(height)
+            side = _agreed_sides(votes, sample, height, band, grid, progress.part(0.5, 1.0))
+    if side is None:
         return None
     continued = np.maximum(np.abs(height), _LEAST * grid.spacing)
     off = np.where(band.past_rim, continued, np.linalg.norm(band.step, axis=1))
@@ -86,23 +90,45 @@ class _Votes:
         chosen = np.abs(self.sign) == 1
         return _Votes(self.low[chosen], self.high[chosen], self.sign[chosen])
 
-    def at_folds(self, surface: LocalSurface, sample: np.ndarray, x: np.ndarray) -> "_Votes":
-        """The same with other votes between nodes, which are at x (b,3) and go with samples (b,), beside sharp folds:
-        they are on one side if both are in the wedge, or none. There the steps to nodes turn from one sheet to the
-        other, and cells cannot tell."""
-        folded, inside = np.zeros((2, len(x)), bool)
-        node = np.flatnonzero(_in_wedges(surface, np.arange(surface.tree.n), surface.points)[0][sample])
-        folded[node], inside[node] = _in_wedges(surface, sample[node], x[node])
-        alike = np.where(inside[self.low] == inside[self.high], 1.0, -1.0) * np.abs(self.sign)
-        return replace(self, sign=np.where(folded[self.low] & folded[self.high], alike, self.sign))
-
     def matrix(self, n) -> csr_matrix:
         return symmetric(self.sign, self.low, self.high, n)
 
 
+@dataclass(frozen=True)
+class _Folds:
+    """Nodes of the band beside sharp folds. In the wedge of one the steps to nodes turn from one sheet to the other,
+    and cells cannot tell which edges are crossed; beyond it sheets do not go on.
+
+    toward : (b,), to which side of the node's sheet the other one turns, -1 or 1; 0 for other nodes
+    inside : (b,) bool, nodes in the wedge
+    """
+
+    toward: np.ndarray
+    inside: np.ndarray
+
+    @classmethod
+    def of(cls, surface: LocalSurface, sample: np.ndarray, x: np.ndarray) -> "_Folds":
+        """Those among nodes that are at x (b,3) and go with samples (b,)."""
+        toward, inside = np.zeros(len(x)), np.zeros(len(x), bool)
+        node = np.flatnonzero(_in_wedges(surface, np.arange(surface.tree.n), surface.points)[0][sample])
+        toward[node], inside[node] = _in_wedges(surface, sample[node], x[node])
+        return cls(toward, inside)
+
+    def votes(self, votes: _Votes) -> _Votes:
+        """Others between such nodes: they are on one side if both are in the wedge, or none."""
+        alike = np.where(self.inside[votes.low] == self.inside[votes.high], 1.0, -1.0) * np.abs(votes.sign)
+        both = (self.toward[votes.low] != 0) & (self.toward[votes.high] != 0)
+        return replace(votes, sign=np.where(both, alike, votes.sign))
+
+    def heights(self, height: np.ndarray) -> np.ndarray:
+        """Heights (b,) over the nodes' sheets with the signs that they have then."""
+        return np.where(self.toward != 0, np.where(self.inside, self.toward, -self.toward) * np.abs(height), height)
+
+
 def _in_wedges(surface, sample, x):
-    """Whether places (m,3) that go with some samples (m,) are near a sharp fold, where another sheet turns towards that
-    of the sample, (m,) bool, and whether they are in its wedge, beside either sheet where the other one is, (m,)."""
+    """For places (m,3) that go with some samples (m,): near a sharp fold, to which side of the sample's sheet another
+    one turns, (m,) of -1 and 1, 0 elsewhere; and whether they are in its wedge, beside either sheet where the other one
+    is, (m,) bool."""
     near = surface.tree.query(x, k=range(1, min(_NEAR_FOLD, surface.tree.n) + 1), workers=-1)[1]
     own, theirs = surface.normals[sample, None], surface.normals[near]
     step = surface.points[near] - surface.points[sample, None]
@@ -112,7 +138,7 @@ def _in_wedges(surface, sample, x):
     at = np.arange(len(sample)), sharp.argmax(axis=1)
     height = row_dots(x - surface.points[sample], own[:, 0]) * towards[at]
     other = row_dots(x - surface.points[near[at]], theirs[at]) * back[at]
-    return sharp[at], (height > 0) & (other > 0)
+    return np.where(sharp[at], towards[at], 0.0), (height > 0) & (other > 0)
 
 
 def _votes(band, crossings):
@@ -134,6 +160,13 @@ def _heights(band, surface, grid):
     sample[past] = seen[KDTree(surface.points[seen]).query(x, workers=-1)[1]]
     step[past] = x - surface.points[sample[past]]
     return sample, row_dots(step, surface.normals[sample])
+
+
+def _agreed_sides(votes, sample, height, band, grid, progress):
+    """Sides of the nodes of the band, (b,) of -1 and 1; None where too many votes are overruled."""
+    sure = votes.sure()
+    side = _sides_of_nodes(votes, sure, sample, height, progress.part(0.0, 0.8))
+    return side if _agree(sure, side, band, grid, progress.part(0.8, 1.0)) else None
 
 
 def _sides_of_nodes(votes, sure, sample, height, progress):
