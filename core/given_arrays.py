@@ -34,3 +34,14 @@ def finite_points(given, least: int = 0) -> np.ndarray:
     if len(points) < least:
         raise InputError(f"{len(points)} points given; at least {least} are needed")
     return points
+
+
+def spacing_of(points: np.ndarray, given) -> np.ndarray:
+    """Local spacing (n,) float64 of points (n,3). Raises :class:`InputError` for another shape, and for what is not
+    above 0 and finite."""
+    spacing = real_numbers(given, "local spacings", "an (n,) array, as local_spacing(points) gives it")
+    if spacing.shape != (len(points),):
+        raise InputError(f"local spacings have shape {spacing.shape}; give one for each of the {len(points)} points")
+    if not ((spacing > 0) & (spacing < np.inf)).all():
+        raise InputError("some local spacings are not above 0 and finite; give what local_spacing(points) does")
+    return spacing

@@ -6,7 +6,7 @@ noise breaks first. Robust quadrics through the neighbours need no diagram, and 
 
 import numpy as np
 
-from ..given_arrays import finite_points
+from ..given_arrays import finite_points, spacing_of
 from ..progress import Progress
 from ..settings import Settings
 from .clusters import Clusters
@@ -28,10 +28,11 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     strength : "auto" moves the samples that are found noisy; a number in [0,1] moves all this share of the way (0 none)
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
-    nothing is to do. Raises :class:`InputError` for points that are not finite, :class:`SettingsError` for another
-    strength.
+    nothing is to do. Raises :class:`InputError` for points that are not finite and for spacings that are none,
+    :class:`SettingsError` for another strength.
     """
     progress, given, points = Progress.of(progress), points, finite_points(points)
+    spacing = spacing_of(points, spacing)
     strength = Settings(denoise=strength).denoise
     if len(points) <= LADDER[0]:
         return given, {}

@@ -5,7 +5,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from ..errors import InputError, SettingsError
-from ..given_arrays import finite_points, real_numbers
+from ..given_arrays import finite_points, real_numbers, spacing_of
+from ..points import MINIMUM_SAMPLES
 from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples
@@ -32,11 +33,12 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     (`random_axes`), from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and
     .975 instead of .970, .989 and .9999.
 
-    Raises :class:`InputError` for points that are not finite and for constraints as :func:`checked_constraints` does,
-    :class:`MissingDependency` where torch or a GPU is asked for and missing, :class:`SettingsError` where NumPy is
-    asked for on a GPU.
+    Raises :class:`InputError` for fewer than 4 points, points that are not finite, spacings that are none, and
+    constraints as :func:`checked_constraints` does, :class:`MissingDependency` where torch or a GPU is asked for and
+    missing, :class:`SettingsError` where NumPy is asked for on a GPU.
     """
-    progress, points = Progress.of(progress), finite_points(points)
+    progress, points = Progress.of(progress), finite_points(points, least=MINIMUM_SAMPLES)
+    spacing = spacing_of(points, spacing)
     constraints, _ = checked_constraints(constraints, np.arange(len(points)), len(points))
     if settings.solver == "pca":
         normals, confidence = pca_normals(points)

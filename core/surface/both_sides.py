@@ -22,6 +22,8 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
     two halves, and where parts of the sheet touch in a vertex each gets its own, so that every edge of the result has
     two faces and those around a vertex form one fan.
     """
+    if not len(sheet.faces):
+        return sheet
     sheet = _turned(sheet)
     sides = _sides(sheet)
     place = np.empty(sides.vertex.max(initial=-1) + 1, sheet.faces.dtype)

@@ -77,6 +77,12 @@ def test_stages_alone_refuse_what_a_run_refuses():
     for row in (300, -1):
         with pytest.raises(InputError, match=f"row {row} the first"):
             estimate_normals(points, spacing, constraints=([row], [[0, 0, 1.0]]))
+    for wrong, message in ((0.1, r"shape \(\)"), (spacing[:5], r"shape \(5,\)"), (0 * spacing, "not above 0")):
+        for stage in (denoise, estimate_normals):
+            with pytest.raises(InputError, match=message):
+                stage(points, wrong)
+    with pytest.raises(InputError, match="3 points given; at least 4"):
+        estimate_normals(points[:3], spacing[:3])
     surface = fit_local_surface(points, points, np.ones(300), spacing, 3.0)
     for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
         with pytest.raises(SettingsError, match="is 'foo'; choose one of"):

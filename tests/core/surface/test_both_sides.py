@@ -183,6 +183,10 @@ def test_faces_may_be_wound_unlike():
     assert KDTree(alike.vertices).query(cover.vertices)[0].max() < 1e-9
 
 
+def test_nothing_has_no_sides():
+    assert not len(both_sides(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), CELL).faces)
+
+
 @pytest.mark.parametrize("pages", [[0, 90, 180], [200, 10, 100, 310], [0, 20, 40, 60, 80]])
 def test_sides_that_face_each_other_are_joined(pages):
     """In the wedge between neighbouring pages lies one vertex for each inside of the line, halfway between them."""
