@@ -329,7 +329,7 @@ class TestProgress:
 
     def test_names_every_stage_in_order(self, calls):
         stages = list(dict.fromkeys(text for _, text in calls if text))
-        assert stages == ["cleaning", "normals", "distance field", "crossings", "single layer"]
+        assert stages == ["cleaning", "normals", "distance field", "crossings", "single layer", "report"]
 
     def test_false_stops_the_run_at_that_very_call(self, calls):
         calls = distinct(calls)
