@@ -60,6 +60,8 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - detached: in a small part of its own that is a cloud rather than a sheet, be it a noisy one, or the shell of a
       convex body, or that is sparse and of too few samples to tell;
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
+
+    A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
@@ -147,7 +149,8 @@ class _Surroundings:
         return self._stands_out(found, self.off, over_theirs)
 
     def _stands_out(self, found, height, times):
-        """Which of the samples `found` have so many times the largest of the median heights around each neighbour."""
+        """Which of the samples `found` have so many times the largest of the median heights around each neighbour, and
+        are in no sheet of their own."""
         row = np.flatnonzero(found)
         theirs = np.median(height[self.neighbours[self.neighbours[row]]], axis=2).max(axis=1)
         found[row] = (height[row] > times * theirs) & ~self._in_sheet(row)

@@ -27,6 +27,7 @@ from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..linalg import row_dots, symmetric
 from ..lookup import is_among, numbered
+from ..parallel import over_rows
 from ..progress import Progress
 from .crossings import Crossings
 from .sides import patch_lengths, patches
@@ -34,6 +35,7 @@ from .spreading import spread_signs
 
 _NEAR_FOLD = 24  # samples around a place, among which the other sheet of a fold is looked for
 _SHARP, _FOLD = -0.1, 0.9  # cosines between normals into the wedge of a sharp fold, and size of those of others
+_CHUNK = 1 << 13  # places
 _BEYOND = 3.0  # cells, distance that nodes out of the band count as
 _ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 6, 300, 0.03, 1e-3
 _SWEEPS = 12
@@ -129,7 +131,17 @@ def _in_wedges(surface, sample, x):
     """For places (m,3) that go with some samples (m,): near a sharp fold, to which side of the sample's sheet another
     one turns, (m,) of -1 and 1, 0 elsewhere; and whether they are in its wedge, beside either sheet where the other one
     is, (m,) bool."""
-    near = surface.tree.query(x, k=range(1, min(_NEAR_FOLD, surface.tree.n) + 1), workers=-1)[1]
+    toward, inside = np.empty(len(x)), np.empty(len(x), bool)
+
+    def look(part):
+        toward[part], inside[part] = _in_wedge(surface, sample[part], x[part])
+
+    over_rows(look, len(x), _CHUNK)
+    return toward, inside
+
+
+def _in_wedge(surface, sample, x):
+    near = surface.tree.query(x, k=range(1, min(_NEAR_FOLD, surface.tree.n) + 1))[1]
     own, theirs = surface.normals[sample, None], surface.normals[near]
     step = surface.points[near] - surface.points[sample, None]
     towards, back = np.sign(row_dots(step, own)), np.sign(-row_dots(step, theirs))
