@@ -29,7 +29,7 @@ _RAISED = 0.5  # cells further for each cell of it above that
 _WITHIN = 0.75  # of the box's padding, at most
 _CLOSEST = 0.51  # cells; at half a cell a sheet midway between nodes has none below the level
 _LONGEST_STEP = 2.0  # levels
-_DENSE = 2 / 3  # cells, median local spacing
+DENSE = 2 / 3  # cells, median local spacing
 
 
 def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
@@ -94,7 +94,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = spanned(vertices, faces, loose)
     mesh = mesh_of(vertices, faces)
     progress(0.8)
-    dense = np.median(surface.spacing) < _DENSE * grid.spacing
+    dense = np.median(surface.spacing) < DENSE * grid.spacing
     mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)

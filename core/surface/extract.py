@@ -13,12 +13,13 @@ from ..progress import Progress
 from ..settings import WITH_SIDES, Settings
 from .both_sides import both_sides
 from .crossings import Crossings, find_crossings
-from .double_cover import CLAMP, SPARSE, double_cover, level_for
+from .double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
 from .isosurface import need_quads
 from .meetings import Meetings, find_meetings
 from .mesh import Mesh
 from .misfit import askew, distances
 from .pieces import pieces_touch, without_small_pieces
+from .ridges import ridge_share
 from .sides import Sides, find_sides, may_be_closed, needed_band
 from .signed import signed_distance, signed_mesh
 from .single_layer import sheet_of_crossings, sheet_of_sides
@@ -28,6 +29,7 @@ _ASKEW = 0.1  # of the area of a single layer, the same where faces are turned a
 _BETTER = 0.5  # times that misfit, below which the double cover is taken
 _OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples that are, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
+_CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _THROUGH = 0.125  # of those, at least: sheets that pass through each other
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
@@ -140,7 +142,8 @@ class _Layers:
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one with handles; sheets side by
         side have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
-        if _spacing_in_cells(self.local, self.grid) > _SPARSEST:
+        cells = _spacing_in_cells(self.local, self.grid)
+        if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
         if self.meetings.share <= _FEW:
             return True
@@ -195,8 +198,9 @@ def extract_surfaces(
     :func:`band_for` says, and the nodes near the surface.
 
     The double cover is both sides of the single layer, see :mod:`.both_sides`, unless sheets pass through each other or
-    run side by side, or meet where samples do not show it, or samples are sparse; then it is extracted at an offset,
-    see :mod:`.double_cover`.
+    run side by side, or meet where samples do not show it, or samples are sparse, or so dense that chords are most of
+    the error, of which two layers extracted apart have less, and no sheets run close; then it is extracted at an
+    offset, see :mod:`.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

@@ -48,6 +48,13 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
     put(values, band.node[row[raised]], typical[raised].astype(np.float32))
 
 
+def ridge_share(band: NearBand) -> float:
+    """How many grid edges of the band cross a ridge, for each of its nodes: where sheets run up to twice its width
+    apart, or turn within it."""
+    toward = (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
+    return sum(len(_facing(axis, *band.edges(axis), toward)[0]) for axis in range(3)) / max(len(band.node), 1)
+
+
 def _averaged(height, place, reach):
     """Heights (m,) at places (m,3), averaged over the nearest few within reach: where those of single nodes decide,
     pillars are left in the gap."""
@@ -60,10 +67,15 @@ def _averaged(height, place, reach):
 def _ridges(axis, low, high, away, toward, cell):
     """Of grid edges along `axis` between rows `low` and `high` of the band, those with a ridge between, as rows of both
     ends (2,e), and its height (e,): where the planes through both feet are equally far."""
-    met = (toward[axis, low] > 0) & (toward[axis, high] < 0)
-    low, high = low[met], high[met]
-    facing = dots(toward[:, low], toward[:, high]) < _FACING
-    low, high = low[facing], high[facing]
+    low, high = _facing(axis, low, high, toward)
     rise, fall = toward[axis, low], -toward[axis, high]
     along = np.clip((away[high] - away[low] + cell * fall) / (rise + fall), 0, cell)
     return np.stack([low, high]), away[low] + along * rise
+
+
+def _facing(axis, low, high, toward):
+    """Those grid edges along `axis` the steps to whose ends point at each other, as rows of both."""
+    met = (toward[axis, low] > 0) & (toward[axis, high] < 0)
+    low, high = low[met], high[met]
+    facing = dots(toward[:, low], toward[:, high]) < _FACING
+    return low[facing], high[facing]
