@@ -22,7 +22,8 @@ def order_around(sheet: Mesh, edge: np.ndarray, count: np.ndarray) -> np.ndarray
     if not len(line):
         return order
     corner, on = sheet.faces.reshape(-1), edge.reshape(-1)[order[line]]
-    here, next_, third = (corner[at] for at in _corners_from(order[line]))
+    after = corner_after(order[line])
+    here, next_, third = corner[order[line]], corner[after], corner[corner_after(after)]
     angle = _angles(sheet, np.minimum(here, next_), np.maximum(here, next_), third)
     sorted_ = np.lexsort((angle, on))
     order[line], angle = order[line][sorted_], angle[sorted_]
@@ -31,10 +32,9 @@ def order_around(sheet: Mesh, edge: np.ndarray, count: np.ndarray) -> np.ndarray
     return order
 
 
-def _corners_from(corner):
-    """Some corners, and the next two of the same faces."""
-    face, at = np.divmod(corner, 3)
-    return corner, 3 * face + (at + 1) % 3, 3 * face + (at + 2) % 3
+def corner_after(corner: np.ndarray) -> np.ndarray:
+    """The next corner of the same triangle, for corners (m,) numbered three to a face."""
+    return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
 def _as_along_lines(sheet, edge, count, order, angle):
@@ -42,7 +42,7 @@ def _as_along_lines(sheet, edge, count, order, angle):
     their angles (e,3) are, between the same three strips. Since strips are wound alike, one of them tells which way the
     line goes, and another that is there twice goes along the line both ways."""
     corner = sheet.faces.reshape(-1)
-    tail, head = (corner[at] for at in _corners_from(order)[:2])
+    tail, head = corner[order], corner[corner_after(order)]
     strip = _strips(sheet, edge, count)[order // 3]
     alone = (strip != np.roll(strip, 1, axis=1)) & (strip != np.roll(strip, -1, axis=1))
     turned = (np.where(alone, strip, len(sheet.faces)).argmin(axis=1)[:, None] + np.arange(3)) % 3

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..linalg import cross, lengths
-from .around_edges import order_around
+from .around_edges import corner_after, order_around
 from .layers import HAIR
 from .mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
 
@@ -58,7 +58,7 @@ def _sides(sheet):
     edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
     order, several = order_around(sheet, edge, count), np.repeat(count, count)
     edge = edge.reshape(-1)
-    here, after = np.arange(corners), _after(np.arange(corners))
+    here, after = np.arange(corners), corner_after(np.arange(corners))
     upwards = corner < corner[after]
     ends = np.stack([np.where(upwards, here, after), np.where(upwards, after, here)])
     following, last = np.roll(order, -1), np.cumsum(count) - 1
@@ -87,11 +87,6 @@ def _cycles(after):
         least = np.minimum(first, first.take(after))
     number = np.cumsum(first == each, dtype=after.dtype) - 1
     return int(number[-1]) + 1 if len(number) else 0, number.take(first)
-
-
-def _after(corner):
-    """The next corner of the same face."""
-    return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
 def _alike(*keys):

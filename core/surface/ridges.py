@@ -33,7 +33,7 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
     values : (nx,ny,nz) float32 or Blocks, distances at the nodes     level : float; both in the units of the samples
     """
     away = at_nodes(values, band.node).astype(np.float64)
-    toward = (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
+    toward = _directions(band)
     height, edges = np.zeros(len(away)), [(axis, *band.edges(axis)) for axis in range(3)]
     for _, (ends, found) in in_order(lambda each: _ridges(*each, away, toward, grid.spacing), edges):
         for end in ends:
@@ -51,8 +51,13 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
 def ridge_share(band: NearBand) -> float:
     """How many grid edges of the band cross a ridge, for each of its nodes: where sheets run up to twice its width
     apart, or turn within it."""
-    toward = (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
+    toward = _directions(band)
     return sum(len(_facing(axis, *band.edges(axis), toward)[0]) for axis in range(3)) / max(len(band.node), 1)
+
+
+def _directions(band):
+    """Unit directions from the surface to the nodes of the band, (3,b)."""
+    return (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
 
 
 def _averaged(height, place, reach):
