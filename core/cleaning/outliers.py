@@ -40,9 +40,10 @@ _DETACHED = 4.0  # a gap this many times the local spacing on either side separa
 _SMALL_PART, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part
 _LOOKS, _SLIGHT = 256, 0.25  # samples of a part whose wider neighbourhoods are looked at; a sheet is thinner in some
 _SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where so many times as sparse as the cloud
-_SHELL = 16, 0.95, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
+_SHELL = 16, 0.85, 0.15  # least number of samples; so many of them this close to the convex hull, spacings, are a shell
+_DENSER = 0.75  # spacing over the median of the cloud, below which a thick part of fewer samples is a cloud
 
-_DIRTY = 0.0005  # share of strays from which on those close to the surface are looked for as well
+_DIRTY, _NONE = 0.0005, 1  # share and number of strays above which those close to the surface are looked for as well
 _STRICT = 0.7  # share of the limits above that then holds for those beside a surface
 _FITTED = 20  # neighbours of the quadrics that those are measured against
 _HOVERING = 6.0  # distance from the quadric over the largest of the medians around each neighbour
@@ -58,7 +59,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
       as sparse, which may be a wire sampled less;
     - detached: in a small part of its own that is a cloud rather than a sheet, be it a noisy one, or the shell of a
-      convex body, or that is sparse and of too few samples to tell;
+      convex body; of too few samples to tell, if it is denser than the cloud or sparse;
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
     A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
@@ -71,7 +72,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
         part = progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)
         kept = np.flatnonzero(~stray)
         around = _Surroundings(points[kept], part.part(0.0, 0.6))
-        dirty = stray.sum() > _DIRTY * len(points)
+        dirty = stray.sum() > max(_DIRTY * len(points), _NONE)
         found = around.beside(_STRICT if dirty else 1.0) | around.scattered(part.part(0.6, 0.7))
         part(0.7)
         found |= around.detached()
@@ -210,13 +211,14 @@ class _Surroundings:
         count, part = connected_components(links, directed=False)
         size = np.bincount(part, minlength=count)
         fewest, times = _SCANTY
-        sparser = self.spacing > times * np.median(self.spacing)
-        thick, sparse, sparser, wires = (
+        relative = self.spacing / np.median(self.spacing)
+        thick, denser, sparse, sparser, wires = (
             np.bincount(part, weights=samples, minlength=count) > 0.5 * size
-            for samples in (self.thickness > _THICK, self.sparse, sparser, self.wire)
+            for samples in (self.thickness > _THICK, relative < _DENSER, self.sparse, relative > times, self.wire)
         )
         scanty = (sparse & (size < _SHELL[0]) | sparser & (size < fewest) & ~wires) & ~self.wireframe
-        clouds = (thick | scanty) & (size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max()))
+        small = size < min(_SMALL_PART * len(self.points), _OF_LARGEST * size.max())
+        clouds = (thick & (denser | (size >= _SHELL[0])) | scanty) & small
         ends = np.cumsum(size)
         by_part = np.argsort(part, kind="stable")
         for number in np.flatnonzero(clouds & ~scanty & (size >= _SHELL[0])):

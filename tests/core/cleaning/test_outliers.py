@@ -151,6 +151,25 @@ def test_a_small_closed_body_of_its_own_stays(count):
         assert not find_outliers(points)[-count:].any()
 
 
+@pytest.mark.parametrize("count", [9, 12, 15])
+def test_of_a_few_samples_of_their_own_a_clump_is_found_and_what_is_as_dense_as_the_cloud_is_not(count):
+    """The end of a thin part, whose narrowest samples are far apart, is no more than a few samples."""
+    body = 0.025 * np.sqrt(count) * shapes.scattered_sphere(count, seed=3) * [1, 0.6, 0.4]
+    clump = np.random.default_rng(0).normal(size=(count, 3)) * 0.008
+    for few, dropped in ((body, False), (clump, True)):
+        points = np.vstack([shapes.scattered_sphere(3000), few + [2, 0, 0]])
+        np.testing.assert_array_equal(find_outliers(points), (np.arange(len(points)) >= 3000) & dropped)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_one_stray_takes_no_samples_at_edges_with_it(seed):
+    rng = np.random.default_rng(seed)
+    box = rng.uniform(-1, 1, (500, 3))
+    box[np.arange(500), rng.integers(0, 3, 500)] = rng.choice([-1.0, 1.0], 500)
+    points = np.vstack([box * [1, 0.3, 0.15], [[0, 0, 2]]])
+    np.testing.assert_array_equal(find_outliers(points), np.arange(501) == 500)
+
+
 def test_of_many_small_bodies_none_goes():
     rng = np.random.default_rng(4)
     bodies = [0.2 * shapes.scattered_sphere(12, seed) + [seed % 8, seed // 8, 0] for seed in range(64)]
