@@ -157,7 +157,7 @@ def test_of_a_few_samples_of_their_own_a_clump_is_found_and_what_is_as_dense_as_
     body = 0.025 * np.sqrt(count) * shapes.scattered_sphere(count, seed=3) * [1, 0.6, 0.4]
     clump = np.random.default_rng(0).normal(size=(count, 3)) * 0.008
     for few, dropped in ((body, False), (clump, True)):
-        points = np.vstack([shapes.scattered_sphere(3000), few + [2, 0, 0]])
+        points = np.vstack([shapes.scattered_sphere(3000), few + np.array([2, 0, 0])])
         np.testing.assert_array_equal(find_outliers(points), (np.arange(len(points)) >= 3000) & dropped)
 
 

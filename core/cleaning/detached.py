@@ -1,0 +1,68 @@
+"""Small parts of a cloud, far from the others, that are no surface of their own."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, KDTree
+
+from .surroundings import NEIGHBOURS, Surroundings, thickness
+
+SHEET = 0.25  # thickness of a neighbourhood, below which a sheet may be seen in it, a noisy one, too
+_GAP = 4.0  # times the local spacing on either side, that separates parts
+_OF_ALL, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part: larger ones are no strays
+_LOOKS = 256  # samples of a part whose wider neighbourhoods are looked at
+_ENOUGH = 16  # samples, of which fewer do not tell a cloud from the end of something thin
+_HULL = 0.85, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
+_DENSER = 0.75  # spacing over the median of the cloud, below which a thick part of fewer samples is a cloud
+_SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where so many times as sparse as the cloud
+
+
+def detached_clouds(around: Surroundings) -> np.ndarray:
+    """(n,) bool: which samples are in a small part of their own that is a cloud. With enough samples that is one that
+    is neither a sheet, be it a noisy one, nor the shell of a convex body; with fewer, a thick one that is denser than
+    the rest; or one so sparse that its samples do not tell."""
+    part = _parts(around)
+    size = np.bincount(part)
+    relative, (fewest, times) = around.spacing / np.median(around.spacing), _SCANTY
+    thick, denser, sparse, sparser, wires = (
+        np.bincount(part, weights=samples) > 0.5 * size
+        for samples in (around.thick, relative < _DENSER, around.sparse, relative > times, around.wire)
+    )
+    scanty = (sparse & (size < _ENOUGH) | sparser & (size < fewest) & ~wires) & ~around.wireframe
+    small = size < min(_OF_ALL * len(part), _OF_LARGEST * size.max())
+    cloud = small & (scanty | thick & (denser | (size >= _ENOUGH)))
+    ends, by_part = np.cumsum(size), np.argsort(part, kind="stable")
+    for number in np.flatnonzero(cloud & ~scanty & (size >= _ENOUGH)):
+        row = by_part[ends[number] - size[number] : ends[number]]
+        cloud[number] = not (_is_sheet(around.points[row]) or _is_shell(around.points[row], around.spacing[row]))
+    return cloud[part]
+
+
+def _parts(around):
+    """The number of the part that each sample is in, (n,)."""
+    n = len(around.points)
+    one, other = np.repeat(np.arange(n), NEIGHBOURS), around.neighbours[:, 1:].reshape(-1)
+    gap = np.linalg.norm(around.points[one] - around.points[other], axis=1)
+    joined = gap < _GAP * np.minimum(around.spacing[one], around.spacing[other])
+    links = coo_matrix((joined[joined], (one[joined], other[joined])), shape=(n, n))
+    return connected_components(links, directed=False)[1]
+
+
+def _is_sheet(points):
+    """Whether a part's points (m,3) are a sheet with noise: thin in some neighbourhoods wider than their noise."""
+    tree, some = KDTree(points), points[:: -(-len(points) // _LOOKS)]
+    k = 2 * NEIGHBOURS
+    while k <= len(points):
+        if np.median(thickness(points[tree.query(some, k=k)[1]])) < SHEET:
+            return True
+        k *= 2
+    return False
+
+
+def _is_shell(points, spacing):
+    """Whether nearly all of a part's points (m,3) lie on its convex hull."""
+    most, near = _HULL
+    points = points - points.mean(axis=0)
+    faces = ConvexHull(points, qhull_options="QJ").equations
+    depth = -(points @ faces[:, :3].T + faces[:, 3]).max(axis=1)
+    return (depth < near * spacing).mean() >= most
