@@ -66,6 +66,14 @@ def _roots(columns):
     return mean, spread, np.arccos(np.clip(cosine, -1, 1)) / 3
 
 
+def tangent_frames(normals: np.ndarray) -> np.ndarray:
+    """Two unit tangents at right angles to each of some normals, (n,3) -> (n,2,3)."""
+    helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normals, first)], axis=1)
+
+
 def solve_positive(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solutions (m,k) of symmetric positive definite systems (m,k,k) with right sides (m,k), by elimination without
     pivoting, which such systems do not need (G. H. Golub and C. F. Van Loan, Matrix Computations, section 4.2)."""

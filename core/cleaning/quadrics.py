@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..field.curvature import tangent_frames
-from ..linalg import COMPONENTS, dots, principal_axes, row_dots, solve_positive
+from ..linalg import COMPONENTS, dots, principal_axes, row_dots, solve_positive, tangent_frames
 from ..parallel import even_chunks, work_through
 from ..progress import Progress
 from .clusters import Clusters

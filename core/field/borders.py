@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
+from .cloud import Cloud
 from .curvature import sag
 from .walls import walled
 
@@ -73,26 +73,20 @@ class Rims:
         return np.maximum(self.reach, self.behind)
 
 
-def find_rims(points, normals, frames, bend, spacing, neighbours, tree: KDTree, bridge: float, progress=None) -> Rims:
+def find_rims(cloud: Cloud, bend, bridge: float, progress=None) -> Rims:
     """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.
 
-    points, normals : (n,3) float64     frames : (n,2,3) tangents     spacing : (n,) local spacing
-    bend            : (n,3,3) float64 of the patches, which may bend towards each other over a gap
-    neighbours      : (n,k) int, nearest first       tree : of the points
-    bridge          : gaps up to this many local spacings are crossed
+    bend   : (n,3,3) float64 of the patches, which may bend towards each other over a gap
+    bridge : gaps up to this many local spacings are crossed
     """
-
-    def find(part):
-        return _find_rims(part, points, normals, frames[part], bend, spacing, neighbours, tree, bridge)
-
-    chunks = Progress.of(progress).chunks(len(points), rows_at_a_time(bridge, len(points)))
-    found = [rims for _, rims in in_order(find, chunks)]
+    chunks = Progress.of(progress).chunks(len(cloud), rows_at_a_time(bridge, len(cloud)))
+    found = [rims for _, rims in in_order(lambda part: _find_rims(part, cloud, bend, bridge), chunks)]
     return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
 
 
-def _find_rims(part, points, normals, frames, bend, spacing, neighbours, tree, bridge):
-    cloud = points, normals, spacing, neighbours
-    spacing, neighbours = spacing[part], neighbours[part]
+def _find_rims(part, cloud, bend, bridge):
+    points, normals, frames = cloud.points, cloud.normals, cloud.frames[part]
+    spacing, neighbours = cloud.spacing[part], cloud.neighbours[part]
     n, k = neighbours.shape
     own, theirs = normals[part], normals[neighbours]
     step = points[neighbours] - points[part, None]
@@ -121,11 +115,10 @@ def _find_rims(part, points, normals, frames, bend, spacing, neighbours, tree, b
     gap = (width > GAP) & (count > 0)
     distance = np.full(n, np.inf)
     rows = np.flatnonzero(gap)
-    ahead = part.start + rows, outward[rows], spacing[rows]
-    distance[rows], other = across_gaps(*ahead, points, normals, tree, bridge, bend=bend)
+    distance[rows], other = across_gaps(part.start + rows, outward[rows], cloud, bridge, bend=bend)
     bridged = np.isfinite(distance)
     rows, other = rows[bridged[rows]], other[bridged[rows]]
-    bridged[rows] = ~walled(part.start + rows, other, *cloud)
+    bridged[rows] = ~walled(part.start + rows, other, cloud)
     reach = np.zeros(n)
     reach[bridged] = bridged_reach(distance[bridged], spacing[bridged])
     ends = np.einsum("nea,nai->nei", ends, frames)
@@ -211,14 +204,14 @@ def _within(bridge, n):
     return min(n, int(4 * bridge**2) + 8)
 
 
-def across_gaps(
-    rows, outward, spacing, points, normals, tree: KDTree, bridge: float, step_up=_STEP, most=None, bend=None
-):
-    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings away
-    and off the tangent plane, or the patch that `bend` (n,3,3) says where given, by less than the share `step_up` of
-    that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most` nearest samples where
-    given."""
-    distance, other = tree.query(points[rows], k=min(_within(bridge, len(points)), most or len(points)))
+def across_gaps(rows, outward, cloud: Cloud, bridge: float, spacing=None, step_up=_STEP, most=None, bend=None):
+    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings, or
+    of those given (m,), away and off the tangent plane, or the patch that `bend` (n,3,3) says where given, by less than
+    the share `step_up` of that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most`
+    nearest samples where given."""
+    points, normals = cloud.points, cloud.normals
+    spacing = cloud.spacing[rows] if spacing is None else spacing
+    distance, other = cloud.tree.query(points[rows], k=min(_within(bridge, len(cloud)), most or len(cloud)))
     step = points[other] - points[rows, None]
     ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
     near = (distance > 0) & (distance < bridge * spacing[:, None])

@@ -5,6 +5,7 @@ import numpy as np
 from ..linalg import dots, row_dots, solve_positive
 from ..parallel import work_through
 from ..progress import Progress
+from .cloud import Cloud
 
 _WIDTH = 1.2  # of the Gaussian weight, local spacings
 _ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting
@@ -13,29 +14,21 @@ _STIFFNESS = 1e-3
 _CHUNK = 2048  # samples
 
 
-def tangent_frames(normals: np.ndarray) -> np.ndarray:
-    """Two unit tangents at each sample, (n,3) -> (n,2,3)."""
-    helper = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    first = np.cross(normals, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(normals, first)], axis=1)
-
-
-def bending(points, normals, frames, spacing, neighbours, progress=None) -> np.ndarray:
+def bending(cloud: Cloud, progress=None) -> np.ndarray:
     """Second fundamental forms as tensors B, (n,3,3) float64: the surface near a sample has height l.B.l / 2 above the
     tangent plane at tangential offset l.
 
-    Weighted least squares over the `neighbours` (n,k) of each sample, each giving its height and, through its normal
+    Weighted least squares over the neighbours of each sample, each giving its height and, through its normal
     turned to agree with the sample's, the slope there (three equations each). Curvatures are limited to one per local
     spacing.
     """
-    bend = np.empty((len(points), 3, 3))
-    columns = np.ascontiguousarray(points.T), np.ascontiguousarray(normals.T)
+    bend = np.empty((len(cloud), 3, 3))
+    columns = np.ascontiguousarray(cloud.points.T), np.ascontiguousarray(cloud.normals.T)
 
     def fit(part):
-        bend[part] = _bending(*columns, part, frames[part], spacing[part], neighbours[part])
+        bend[part] = _bending(*columns, part, cloud.frames[part], cloud.spacing[part], cloud.neighbours[part])
 
-    work_through(fit, Progress.of(progress).chunks(len(points), _CHUNK))
+    work_through(fit, Progress.of(progress).chunks(len(cloud), _CHUNK))
     return bend
 
 

@@ -9,11 +9,11 @@ much further, on both sides of a line.
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import Rims, across_gaps, bridged_reach
+from .cloud import Cloud
 
 _FURTHER = 5.0  # times the bridging length, that gaps between lines are bridged, in the median spacing around
 _AROUND = 64  # samples
@@ -27,28 +27,25 @@ _MOST = 128  # samples among which the one across is looked for
 _CHUNK = 512  # samples
 
 
-def with_line_gaps_bridged(rims: Rims, points, normals, spacing, tree: KDTree, bridge: float, progress=None) -> Rims:
+def with_line_gaps_bridged(rims: Rims, cloud: Cloud, bridge: float, progress=None) -> Rims:
     """The rims with gaps between lines of samples bridged to either side, up to five times `bridge` local spacings
-    wide and half as wide again as those around.
-
-    points, normals : (n,3) float64     spacing : (n,) local spacing     tree : of the points
-    """
-    row = np.flatnonzero(rims.gap)
-    around = _around(row, points, tree)
+    wide and half as wide again as those around."""
+    row, spacing = np.flatnonzero(rims.gap), cloud.spacing
+    around = _around(row, cloud)
     many = rims.gap[around].mean(axis=1) >= _GAPS
     row, around = row[many], around[many]
-    width, other = _gaps_to_both_sides(row, around, rims, points, normals, spacing, tree, bridge, progress)
+    width, other = _gaps_to_both_sides(row, around, rims, cloud, bridge, progress)
 
     thin = ~(width[:, 1] < _BEHIND * spacing)
     width[~thin, 1] = np.nan
     looking = np.isfinite(width).any(axis=1)
     row, around = row[looking[row]], around[looking[row]]
-    shares = np.full((2, len(points)), np.nan)
+    shares = np.full((2, len(cloud)), np.nan)
     shares[:, row] = looking[around].mean(axis=1), np.nanmean(np.where(looking, thin, np.nan)[around], axis=1)
 
     at, side = np.nonzero(np.isfinite(width[row]))
     own = row[at]
-    around = np.concatenate([around[at], _around(other[own, side], points, tree)], axis=1)
+    around = np.concatenate([around[at], _around(other[own, side], cloud)], axis=1)
     of_looking, of_thin = np.nanmean(shares[:, around], axis=2)
     lines = (of_looking >= _LOOKING) & (of_thin >= _THIN)
     lines &= width[own, side] <= _EVEN * np.nanmedian(width[around], axis=(1, 2))
@@ -61,20 +58,20 @@ def with_line_gaps_bridged(rims: Rims, points, normals, spacing, tree: KDTree, b
     return replace(rims, bridged=bridged, reach=reach[:, 0], behind=reach[:, 1])
 
 
-def _around(rows, points, tree):
+def _around(rows, cloud):
     """The samples around those in `rows` (m,), themselves first, (m,k)."""
-    return tree.query(points[rows], k=min(_AROUND, len(points)), workers=-1)[1]
+    return cloud.tree.query(cloud.points[rows], k=min(_AROUND, len(cloud)), workers=-1)[1]
 
 
-def _gaps_to_both_sides(row, around, rims, points, normals, spacing, tree, bridge, progress):
+def _gaps_to_both_sides(row, around, rims, cloud, bridge, progress):
     """Distances (n,2) to the nearest sample ahead of samples `row`, outwards, and behind them, nan where there is none;
     and the numbers of these, (n,2)."""
-    distance, other = np.full((len(points), 2), np.nan), np.zeros((len(points), 2), np.int64)
+    distance, other = np.full((len(cloud), 2), np.nan), np.zeros((len(cloud), 2), np.int64)
 
     def look(part):
-        at, usual = row[part], np.median(spacing[around[part]], axis=1)
+        at, usual = row[part], np.median(cloud.spacing[around[part]], axis=1)
         ways = rims.outward[at], -rims.outward[at]
-        return [across_gaps(at, way, usual, points, normals, tree, _FURTHER * bridge, _STEP, _MOST) for way in ways]
+        return [across_gaps(at, way, cloud, _FURTHER * bridge, usual, _STEP, _MOST) for way in ways]
 
     for part, found in in_order(look, Progress.of(progress).chunks(len(row), _CHUNK)):
         for side, (away, across) in enumerate(found):

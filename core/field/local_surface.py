@@ -9,16 +9,15 @@ from scipy.spatial import KDTree
 from ..linalg import COMPONENTS
 from ..progress import Progress
 from .borders import Rims, find_rims
-from .curvature import bending, tangent_frames
+from .cloud import Cloud
+from .curvature import bending
 from .line_gaps import with_line_gaps_bridged
 from .patches import Patches
 from .projection import NEAREST, Projection, project
 from .rim_lines import with_rim_lines
 from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 
-NEIGHBOURS = 16  # of a sample, that its patch is fitted to
 _AROUND = 32  # samples, whose median spacing is that of a place
-_CHUNK = 16384  # samples
 
 
 @dataclass(frozen=True)
@@ -72,30 +71,16 @@ class LocalSurface:
         return self.tree.query(places, k=range(1, 1 + min(_AROUND, self.tree.n)), workers=-1)[1]
 
 
-def patch_neighbours(tree: KDTree, progress=None) -> np.ndarray:
-    """The samples that each one's patch is fitted to, (n,k) int, nearest first: 16, or all others where there are
-    fewer."""
-    k = min(NEIGHBOURS, tree.n - 1) + 1
-    found = np.empty((tree.n, k - 1), np.int64)
-    for part in Progress.of(progress).chunks(tree.n, _CHUNK):
-        found[part] = tree.query(tree.data[part], k=k, workers=-1)[1][:, 1:]
-    return found
-
-
 def fit_local_surface(points, normals, confidence, spacing, bridge: float, progress=None) -> LocalSurface:
     """Patches and rims of samples (n,3) with axes (n,3), their confidence (n,) and local spacing (n,); gaps up to
     `bridge` spacings are closed."""
     progress = Progress.of(progress)
-    tree = KDTree(points)
-    frames = tangent_frames(normals)
-    neighbours = patch_neighbours(tree, progress.part(0.0, 0.1))
-    bend = bending(points, normals, frames, spacing, neighbours, progress.part(0.1, 0.5))
-    rims = find_rims(points, normals, frames, bend, spacing, neighbours, tree, bridge, progress.part(0.5, 0.84))
-    rims = with_openings_kept(rims, points, normals, spacing, neighbours, tree, bridge, progress.part(0.84, 0.86))
-    part = progress.part(0.86, 0.87)
-    rims = with_sparser_parts_joined(rims, points, normals, spacing, neighbours, tree, bridge, part)
-    rims = with_line_gaps_bridged(rims, points, normals, spacing, tree, bridge, progress.part(0.87, 0.88))
-    part = progress.part(0.88, 0.9)
-    rims = with_sampling_gaps_bridged(rims, points, normals, bend, spacing, neighbours, tree, bridge, part)
-    rims = with_rim_lines(rims, points, normals, spacing, tree, progress.part(0.9, 1.0))
-    return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, tree)
+    cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))
+    bend = bending(cloud, progress.part(0.1, 0.5))
+    rims = find_rims(cloud, bend, bridge, progress.part(0.5, 0.84))
+    rims = with_openings_kept(rims, cloud, bridge, progress.part(0.84, 0.86))
+    rims = with_sparser_parts_joined(rims, cloud, bridge, progress.part(0.86, 0.87))
+    rims = with_line_gaps_bridged(rims, cloud, bridge, progress.part(0.87, 0.88))
+    rims = with_sampling_gaps_bridged(rims, cloud, bend, bridge, progress.part(0.88, 0.9))
+    rims = with_rim_lines(rims, cloud, progress.part(0.9, 1.0))
+    return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, cloud.tree)

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from .borders import one_sheet
+from .cloud import Cloud
 
 _CONE, _LIFT = 0.8, 0.2  # samples steeper than this above a sample, and further, are across a bay
 _STEEPEST = 2.0  # of a line's slope
@@ -41,12 +41,11 @@ class Beside:
         return held, highest
 
 
-def beside(row, outward, length, points, normals, tree: KDTree, window: float, nearest: int) -> Beside:
-    """The `nearest` samples around those in `row` (r,) at rims, up to `window` lengths (r,) away.
-
-    outward : (r,3) unit, out of the sheet     points, normals : (n,3) float64     tree : of the points
-    """
-    distance, other = tree.query(points[row], k=min(nearest, len(points)), workers=-1)
+def beside(row, outward, length, cloud: Cloud, window: float, nearest: int) -> Beside:
+    """The `nearest` samples around those in `row` (r,) at rims, up to `window` lengths (r,) away; `outward` (r,3)
+    unit, out of the sheet."""
+    points, normals = cloud.points, cloud.normals
+    distance, other = cloud.tree.query(points[row], k=min(nearest, len(cloud)), workers=-1)
     length = length[:, None]
     step = points[other] - points[row, None]
     axes = np.cross(normals[row], outward), outward

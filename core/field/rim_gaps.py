@@ -10,12 +10,12 @@ rim of those in between.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import one_sheet
+from .cloud import Cloud
 from .rim_fits import Beside, beside, lowest_lines
 from .sampling_gaps import largest_empty_area
 
@@ -48,29 +48,30 @@ class RimGaps:
     depth: np.ndarray
 
 
-def spacing_around(row, points, spacing, tree: KDTree) -> tuple[np.ndarray, np.ndarray]:
+def spacing_around(row, cloud: Cloud) -> tuple[np.ndarray, np.ndarray]:
     """The usual spacing around samples in `row` (r,), the median of the nearest 32, and whether these lie at random,
     (r,) bool, rather than evenly spaced."""
-    near = tree.query(points[row], k=range(1, 1 + min(_USUAL, len(points))), workers=-1)[1]
+    points, spacing = cloud.points, cloud.spacing
+    near = cloud.tree.query(points[row], k=range(1, 1 + min(_USUAL, len(cloud))), workers=-1)[1]
     some, at = np.unique(near, return_inverse=True)
-    nearest = tree.query(points[some], k=[2], workers=-1)[0][:, 0] / spacing[some]
+    nearest = cloud.tree.query(points[some], k=[2], workers=-1)[0][:, 0] / spacing[some]
     at_random = np.median(nearest[at.reshape(near.shape)], axis=1) <= _RANDOM
     return np.median(spacing[near], axis=1), at_random
 
 
-def find_rim_gaps(row, outward, usual, at_random, points, normals, tree: KDTree, progress=None) -> RimGaps:
+def find_rim_gaps(row, outward, usual, at_random, cloud: Cloud, progress=None) -> RimGaps:
     """Which samples at rims, `row` (r,) with ways out of the sheet (r,3), lie in gaps of the sampling.
 
-    usual, at_random : (r,), see :func:`spacing_around`     points, normals : (n,3) float64     tree : of the points
+    usual, at_random : (r,), see :func:`spacing_around`
     """
-    random = np.flatnonzero(at_random)
-    number = np.full(len(points), -1)
+    normals, random = cloud.normals, np.flatnonzero(at_random)
+    number = np.full(len(cloud), -1)
     number[row] = np.arange(len(row))
     most = largest_empty_area(len(row), _CHANCE)
 
     def look(part):
         line = random[part]
-        around = beside(row[line], outward[line], usual[line], points, normals, tree, _WINDOW, _NEAREST)
+        around = beside(row[line], outward[line], usual[line], cloud, _WINDOW, _NEAREST)
         straight, slope = _straight_lines(around)
         at, column, depth, on = _below_lines(around, straight, slope, most)
         gap = number[around.other[at, column]]
@@ -88,14 +89,15 @@ def find_rim_gaps(row, outward, usual, at_random, points, normals, tree: KDTree,
     own = normals[row[gap]]
     up = across - row_dots(across, own)[:, None] * own
     up /= np.linalg.norm(up, axis=1, keepdims=True)
-    free = _nothing_ahead(row[gap], up, depth, points, normals, tree)
+    free = _nothing_ahead(row[gap], up, depth, cloud)
     return RimGaps(gap[free], up[free], depth[free])
 
 
-def _nothing_ahead(row, up, depth, points, normals, tree):
+def _nothing_ahead(row, up, depth, cloud):
     """Whether no samples of other sheets lie around the rim that samples `row` (g,) are `depth` (g,) off, (g,) bool:
     where sheets meet or run close, a sheet goes on behind them."""
-    distance, other = tree.query(points[row] + _AHEAD * depth[:, None] * up, k=min(_ASKED, len(points)), workers=-1)
+    points, normals, place = cloud.points, cloud.normals, cloud.points[row] + _AHEAD * depth[:, None] * up
+    distance, other = cloud.tree.query(place, k=min(_ASKED, len(cloud)), workers=-1)
     step = points[other] - points[row, None]
     own = one_sheet(step, normals[row, None], normals[other]) | (other == row[:, None])
     return (own | (distance > depth[:, None])).all(axis=1)

@@ -16,6 +16,7 @@ from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import RIM, Rims, chain_lengths, one_sheet
+from .cloud import Cloud
 from .rim_fits import beside, lowest_lines
 from .rim_gaps import RimGaps, find_rim_gaps, spacing_around
 
@@ -35,37 +36,32 @@ _FAR_REACH, _AT_CORNERS, _TURNED_OFF = 3.0, 16, 0.5  # of samples in gaps, at co
 _CHUNK = 512  # rim samples
 
 
-def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=None) -> Rims:
+def with_rim_lines(rims: Rims, cloud: Cloud, progress=None) -> Rims:
     """The rims with margins up to the lines through their outermost samples, or across gaps in the sampling, and with
-    patches of other samples, bridged gaps too, ended at those lines.
-
-    points, normals : (n,3) float64     spacing : (n,) local spacing     tree : of the points
-    """
-    progress = Progress.of(progress)
+    patches of other samples, bridged gaps too, ended at those lines."""
+    progress, normals, spacing = Progress.of(progress), cloud.normals, cloud.spacing
     rim = rims.gap & ~rims.bridged
     row = np.flatnonzero(rim & (chain_lengths(rims, rim) >= _CHAIN))
     if not len(row):
         return rims
 
     def lay(part):
-        return _lines(row[part], rims.outward[row[part]], points, normals, spacing, tree)
+        return _lines(row[part], rims.outward[row[part]], cloud)
 
     found = [lines for _, lines in in_order(lay, progress.part(0.0, 0.5).chunks(len(row), _CHUNK))]
-    usual, at_random = spacing_around(row, points, spacing, tree)
+    usual, at_random = spacing_around(row, cloud)
     beyond = np.where(at_random, *_BEYOND)
     fits = (np.concatenate(each) for each in zip(*found, strict=True))
     lines = _Lines(row, rims.outward[row], normals[row], *fits, beyond)
     part = progress.part(0.5, 1.0)
-    gaps = find_rim_gaps(row, rims.outward[row], usual, at_random, points, normals, tree, part)
+    gaps = find_rim_gaps(row, rims.outward[row], usual, at_random, cloud, part)
     lines.lay_over(gaps, normals, spacing)
     margin = rims.margin.copy()
     size = spacing[row]
     margin[row, 0] = size * lines.margin(lines.height / np.sqrt(1 + lines.slope**2))
 
-    own = np.zeros(len(points), bool)
-    own[row] = True
     other = np.flatnonzero(~rims.gap | rims.bridged)
-    way, distance = _nearest_line(lines, other, points, normals, spacing)
+    way, distance = _nearest_line(lines, other, cloud)
     known = RIM * spacing
     known[other] = np.where(np.isfinite(distance), distance, known[other])
     known[row] = margin[row, 0]
@@ -78,7 +74,7 @@ def with_rim_lines(rims: Rims, points, normals, spacing, tree: KDTree, progress=
     across = row[in_gap]
     reach = rims.reach.copy()
     reach[across] = margin[across, 0]
-    corner = _nearest_line(lines, across, points, normals, spacing, lines.up[in_gap])
+    corner = _nearest_line(lines, across, cloud, lines.up[in_gap])
     lines_at = (np.concatenate(pair) for pair in zip((other, way, distance), (across, *corner), strict=True))
     return _ended(replace(rims, margin=margin, reach=reach), *lines_at, spacing)
 
@@ -132,9 +128,9 @@ class _Lines:
         return self.slope[of] + 2 * quadratic * along + np.where(along > 0, right, -left)
 
 
-def _lines(row, outward, points, normals, spacing, tree):
+def _lines(row, outward, cloud):
     """Heights, slopes (r,) and bends (r,3) of the lines of least area over samples `row`."""
-    around = beside(row, outward, spacing[row], points, normals, tree, _WINDOW, _NEAREST)
+    around = beside(row, outward, cloud.spacing[row], cloud, _WINDOW, _NEAREST)
     along, up = around.outermost(_WINDOW, _BINS)
     least = np.full(len(row), np.inf)
     height, slope, bend = np.zeros(len(row)), np.zeros(len(row)), np.zeros((len(row), 3))
@@ -158,10 +154,11 @@ def _bent(bend, along):
     return quadratic * along**2 + right * np.maximum(along, 0) + left * np.maximum(-along, 0)
 
 
-def _nearest_line(lines, other, points, normals, spacing, across=None):
+def _nearest_line(lines, other, cloud, across=None):
     """Unit direction (m,3) towards the nearest line and distance (m,) to the rim there for samples `other`, inf where
     none of the nearest rim samples' lines is that of their sheet; with directions `across` (m,3), of the rims that turn
     off those at corners."""
+    points, normals, spacing = cloud.points, cloud.normals, cloud.spacing
     most, reach = (_LINES, _REACH) if across is None else (_AT_CORNERS, _FAR_REACH)
     far, near = KDTree(points[lines.row]).query(points[other], k=range(1, 1 + min(most, len(lines.row))), workers=-1)
     way, found = np.zeros((len(other), 3)), np.full(len(other), np.inf)

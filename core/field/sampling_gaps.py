@@ -22,6 +22,7 @@ from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
+from .cloud import Cloud
 from .curvature import sag
 from .walls import walled
 
@@ -38,18 +39,12 @@ _MOST = 256  # samples among which it is
 _APART = 0.06  # of the gap, what the patches to both sides may differ by halfway
 
 
-def with_openings_kept(
-    rims: Rims, points, normals, spacing, neighbours, tree: KDTree, bridge: float, progress=None
-) -> Rims:
+def with_openings_kept(rims: Rims, cloud: Cloud, bridge: float, progress=None) -> Rims:
     """The rims with gaps that have a long row of samples at their rim bridged only up to `bridge` times the median
-    local spacing among the neighbours.
-
-    points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
-    """
+    local spacing among the neighbours."""
     row = np.flatnonzero(rims.bridged)
-    usual = np.median(spacing[neighbours[row]], axis=1)
-    row = row[rims.reach[row] > bridged_reach(bridge * usual, spacing[row])]
-    _, other = _looked_across(row, rims.outward[row], points, normals, spacing, tree, bridge, progress)
+    row = row[rims.reach[row] > bridged_reach(bridge * _usual(row, cloud), cloud.spacing[row])]
+    _, other = _looked_across(row, rims.outward[row], cloud, bridge, progress)
     chain = chain_lengths(rims, rims.gap)
     row = row[np.maximum(chain[row], chain[other]) >= _MANY]
     bridged, reach = rims.bridged.copy(), rims.reach.copy()
@@ -57,47 +52,36 @@ def with_openings_kept(
     return replace(rims, bridged=bridged, reach=reach)
 
 
-def with_sparser_parts_joined(
-    rims: Rims, points, normals, spacing, neighbours, tree: KDTree, bridge: float, progress=None
-) -> Rims:
+def with_sparser_parts_joined(rims: Rims, cloud: Cloud, bridge: float, progress=None) -> Rims:
     """The rims with gaps bridged beyond which the sheet goes on more sparsely sampled, no wider than `bridge` local
-    spacings of the sample across.
-
-    points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
-    """
-    progress, cloud = Progress.of(progress), (points, normals, spacing, tree)
+    spacings of the sample across."""
+    progress, spacing = Progress.of(progress), cloud.spacing
     row = np.flatnonzero(rims.gap & ~rims.bridged)
-    row = row[_near_steps(row, points, spacing, neighbours, _FURTHER * bridge)]
-    usual = np.median(spacing[neighbours[row]], axis=1)
-    distance, other = _looked_across(row, rims.outward[row], *cloud, _FURTHER * bridge, progress.part(0.0, 0.9), _MOST)
+    row = row[_near_steps(row, cloud, _FURTHER * bridge)]
+    distance, other = _looked_across(row, rims.outward[row], cloud, _FURTHER * bridge, progress.part(0.0, 0.9), _MOST)
     ordinary = distance <= bridge * spacing[other]
-    row, usual, distance, other = row[ordinary], usual[ordinary], distance[ordinary], other[ordinary]
-    onward, beyond = _looked_across(other, rims.outward[row], *cloud, _WIDER * bridge, progress.part(0.9, 1.0))
-    sparser = np.isfinite(onward) & (spacing[beyond] >= _SPARSER * usual)
+    row, distance, other = row[ordinary], distance[ordinary], other[ordinary]
+    onward, beyond = _looked_across(other, rims.outward[row], cloud, _WIDER * bridge, progress.part(0.9, 1.0))
+    sparser = np.isfinite(onward) & (spacing[beyond] >= _SPARSER * _usual(row, cloud))
     row, distance = row[sparser], distance[sparser]
     bridged, reach = rims.bridged.copy(), rims.reach.copy()
     bridged[row], reach[row] = True, bridged_reach(distance, spacing[row])
     return replace(rims, bridged=bridged, reach=reach)
 
 
-def with_sampling_gaps_bridged(
-    rims: Rims, points, normals, bend, spacing, neighbours, tree: KDTree, bridge: float, progress=None
-) -> Rims:
+def with_sampling_gaps_bridged(rims: Rims, cloud: Cloud, bend, bridge: float, progress=None) -> Rims:
     """The rims with gaps in the sampling bridged that are as wide as chance leaves them, but no more than half as wide
-    again as `bridge` local spacings, and have no walls beside them.
-
-    points, normals : (n,3) float64     bend : (n,3,3) of the patches     spacing : (n,) local spacing
-    neighbours      : (n,k) int
-    """
+    again as `bridge` local spacings, and have no walls beside them; `bend` (n,3,3) of the patches."""
+    points, spacing = cloud.points, cloud.spacing
     few = chain_lengths(rims, rims.gap) <= _FEW
     rim = rims.gap & ~rims.bridged
     round_ = ~rims.gap & (rims.opening < np.cos(_ROUND / 2)) & _far_from(rim & ~few, points, spacing)
-    row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(points)))
-    distance, other = _looked_across(row, rims.outward[row], points, normals, spacing, tree, widest, progress)
+    row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(cloud)))
+    distance, other = _looked_across(row, rims.outward[row], cloud, widest, progress)
     across = np.isfinite(distance) & few[other]
     row, other, distance = row[across], other[across], distance[across]
-    met = _apart_halfway(row, other, points, normals, bend) <= _APART * distance
-    met &= ~walled(row, other, points, normals, spacing, neighbours)
+    met = _apart_halfway(row, other, points, cloud.normals, bend) <= _APART * distance
+    met &= ~walled(row, other, cloud)
     row, covered = row[met], bridged_reach(distance[met], spacing[row[met]])
     further = rims.gap[row] | (covered > DISC * spacing[row])
     row, covered = row[further], covered[further]
@@ -106,26 +90,30 @@ def with_sampling_gaps_bridged(
     return replace(rims, gap=gap, bridged=bridged, reach=reach)
 
 
-def _near_steps(row, points, spacing, neighbours, within):
+def _usual(row, cloud):
+    """Median local spacing among the neighbours of samples `row` (m,), (m,)."""
+    return np.median(cloud.spacing[cloud.neighbours[row]], axis=1)
+
+
+def _near_steps(row, cloud, within):
     """Which of samples `row` (m,) are within so many of their local spacings from one that is sparse for its
     neighbours, (m,) bool."""
-    some = min(_SOME, neighbours.shape[1] - 1)
-    sparse = spacing >= _SPARSER * np.partition(spacing[neighbours], some, axis=1)[:, some]
+    points, spacing, some = cloud.points, cloud.spacing, min(_SOME, cloud.neighbours.shape[1] - 1)
+    sparse = spacing >= _SPARSER * np.partition(spacing[cloud.neighbours], some, axis=1)[:, some]
     if not sparse.any():
         return np.zeros(len(row), bool)
     return KDTree(points[sparse]).query(points[row])[0] <= within * spacing[row]
 
 
-def _looked_across(row, way, points, normals, spacing, tree, widest, progress, most=None):
+def _looked_across(row, way, cloud, widest, progress, most=None):
     """Distance and number, (m,) each, of the samples that samples `row` find in directions (m,3), up to `widest` local
     spacings away; see :func:`across_gaps`."""
     distance, other = np.empty(len(row)), np.empty(len(row), np.int64)
 
     def look(part):
-        of = row[part]
-        return across_gaps(of, way[part], spacing[of], points, normals, tree, widest, most=most)
+        return across_gaps(row[part], way[part], cloud, widest, most=most)
 
-    chunks = Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(points)))
+    chunks = Progress.of(progress).chunks(len(row), rows_at_a_time(widest, len(cloud)))
     for part, found in in_order(look, chunks):
         distance[part], other[part] = found
     return distance, other

@@ -7,6 +7,7 @@ gaps between samples. But there the surface goes on down the sides of the hole: 
 import numpy as np
 
 from ..linalg import row_dots
+from .cloud import Cloud
 
 _STEEP = 0.6  # largest |n_i . n_j| of a wall's samples
 _FACING = 0.5  # least cosine between their normals and the way across
@@ -14,20 +15,17 @@ _BEFORE, _ASIDE, _UP = 0.2, 1.5, 2.0  # local spacings from the sample that the 
 _CROSSES = 0.3  # local spacings, that the samples of a sheet which crosses that of the gap lie off it on both sides
 
 
-def walled(row, other, points, normals, spacing, neighbours) -> np.ndarray:
-    """Whether a wall stands between samples `row` and `other` (m,), next to either, (m,) bool.
-
-    points, normals : (n,3) float64     spacing : (n,) local spacing     neighbours : (n,k) int
-    """
-    cloud = points, normals, spacing, neighbours
-    return _wall_next_to(row, other, *cloud) | _wall_next_to(other, row, *cloud)
+def walled(row, other, cloud: Cloud) -> np.ndarray:
+    """Whether a wall stands between samples `row` and `other` (m,), next to either, (m,) bool."""
+    return _wall_next_to(row, other, cloud) | _wall_next_to(other, row, cloud)
 
 
-def _wall_next_to(row, other, points, normals, spacing, neighbours):
+def _wall_next_to(row, other, cloud):
+    points, normals, near = cloud.points, cloud.normals, cloud.neighbours[row]
     way = points[other] - points[row]
-    width, size = np.linalg.norm(way, axis=1)[:, None], spacing[row, None]
+    width, size = np.linalg.norm(way, axis=1)[:, None], cloud.spacing[row, None]
     way /= width
-    step, theirs = points[neighbours[row]] - points[row, None], normals[neighbours[row]]
+    step, theirs = points[near] - points[row, None], normals[near]
     along, up = (np.einsum("mki,mi->mk", step, axis) for axis in (way, normals[row]))
     aside = np.sqrt(np.maximum(row_dots(step, step) - along**2 - up**2, 0))
     facing = np.einsum("mki,mi->mk", theirs, way)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.linalg import eigenvalues, inner, outer, principal_axes, solve_positive
+from core.linalg import eigenvalues, inner, outer, principal_axes, solve_positive, tangent_frames
 from tests.shapes import random_rotation
 
 
@@ -102,3 +102,10 @@ def test_no_systems():
 def test_sum_of_products(random):
     a, b = random.normal(size=(2, 30, 40, 5))
     assert inner(a, b) == pytest.approx(np.vdot(a, b), rel=1e-12)
+
+
+def test_frames_are_orthonormal(random):
+    normals = np.concatenate([random.normal(size=(100, 3)), np.eye(3), -np.eye(3)])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = np.concatenate([normals[:, None], tangent_frames(normals)], axis=1)
+    np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)

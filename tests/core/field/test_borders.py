@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
 from core.field.borders import DISC, find_rims
-from core.field.curvature import tangent_frames
-from core.field.local_surface import patch_neighbours
+from core.field.cloud import Cloud
 from core.field.patches import Patches
 from core.points import local_spacing
 from tests import shapes
@@ -14,10 +12,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def rims_of(points, normals, bridge=3.0):
     normals = np.broadcast_to(normals, points.shape)
-    spacing = local_spacing(points)
-    tree = KDTree(points)
-    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
-    return find_rims(points, normals, frames, flat, spacing, patch_neighbours(tree), tree, bridge), spacing
+    cloud = Cloud.of(points, normals, local_spacing(points))
+    return find_rims(cloud, np.zeros((len(points), 3, 3)), bridge), cloud.spacing
 
 
 def open_rim(rims):
@@ -42,10 +38,9 @@ def test_a_gap_that_patches_bend_over_is_bridged():
     normals = points * [1, 1, 0]
     tangent = np.stack([-normals[:, 1], normals[:, 0], np.zeros(len(points))], axis=1)
     bend = -np.einsum("ni,nj->nij", tangent, tangent)
-    spacing, tree = local_spacing(points), KDTree(points)
-    frames, given = tangent_frames(normals), (spacing, patch_neighbours(tree), tree, 5.0)
+    cloud = Cloud.of(points, normals, local_spacing(points))
     beside = (points[:, 0] > 0.4) & (np.abs(points[:, 2]) < 0.6)
-    flat, bent = (find_rims(points, normals, frames, form, *given) for form in (0 * bend, bend))
+    flat, bent = (find_rims(cloud, form, 5.0) for form in (0 * bend, bend))
     assert (flat.gap & beside).any()
     np.testing.assert_array_equal(open_rim(flat)[beside], flat.gap[beside])
     assert not open_rim(bent)[beside].any()

@@ -1,27 +1,19 @@
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
-from core.field.curvature import _ALIGNED, _ONE_SHEET, _STIFFNESS, _WIDTH, bending, tangent_frames
-from core.field.local_surface import patch_neighbours
+from core.field.cloud import Cloud
+from core.field.curvature import _ALIGNED, _ONE_SHEET, _STIFFNESS, _WIDTH, bending
 from core.points import local_spacing
 from tests import shapes
 
 
 def forms(points, normals):
-    spacing = local_spacing(points)
-    return bending(points, normals, tangent_frames(normals), spacing, patch_neighbours(KDTree(points))), spacing
+    cloud = Cloud.of(points, normals, local_spacing(points))
+    return bending(cloud), cloud.spacing
 
 
 def tangential(normals):
     return np.eye(3) - normals[:, :, None] * normals[:, None, :]
-
-
-def test_frames_are_orthonormal(random):
-    normals = np.concatenate([random.normal(size=(100, 3)), np.eye(3), -np.eye(3)])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    axes = np.concatenate([normals[:, None], tangent_frames(normals)], axis=1)
-    np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.5, 2.0, 30.0])
@@ -88,10 +80,10 @@ def test_forms_solve_the_weighted_equations(random):
     points = random.uniform(-1, 1, (60, 3)) * [1, 1, 0.2]
     normals = random.normal(size=(60, 3)) * 0.3 + [0, 0, 1]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    spacing, frames = random.uniform(0.2, 0.4, 60), tangent_frames(normals)
-    neighbours = patch_neighbours(KDTree(points))
-    form = bending(points, normals, frames, spacing, neighbours)
-    for i, others in enumerate(neighbours):
+    spacing = random.uniform(0.2, 0.4, 60)
+    cloud = Cloud.of(points, normals, spacing)
+    form, frames = bending(cloud), cloud.frames
+    for i, others in enumerate(cloud.neighbours):
         rows, values = [np.sqrt(_STIFFNESS) * spacing[i] * np.eye(3)], [np.zeros(3)]
         for j in others:
             step, agreement = points[j] - points[i], normals[i] @ normals[j]

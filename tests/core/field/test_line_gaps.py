@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
 from core import Settings, reconstruct
 from core.field import line_gaps
 from core.field.borders import find_rims
-from core.field.curvature import tangent_frames
+from core.field.cloud import Cloud
 from core.field.line_gaps import with_line_gaps_bridged
-from core.field.local_surface import patch_neighbours
 from core.field.patches import Patches
 from core.points import local_spacing
 from tests import shapes
@@ -18,11 +16,9 @@ PLACES = np.arange(12) * APART
 
 
 def before_and_after(points, normals=UP):
-    normals = np.broadcast_to(normals, points.shape)
-    spacing, tree = local_spacing(points), KDTree(points)
-    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
-    rims = find_rims(points, normals, frames, flat, spacing, patch_neighbours(tree), tree, 3.0)
-    return rims, with_line_gaps_bridged(rims, points, normals, spacing, tree, 3.0), spacing
+    cloud = Cloud.of(points, np.broadcast_to(normals, points.shape), local_spacing(points))
+    rims = find_rims(cloud, np.zeros((len(points), 3, 3)), 3.0)
+    return rims, with_line_gaps_bridged(rims, cloud, 3.0), cloud.spacing
 
 
 def lines(random, along=120, places=PLACES):

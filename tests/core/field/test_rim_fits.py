@@ -4,8 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
+from core.field.cloud import Cloud
 from core.field.rim_fits import beside, lowest_lines
 
 
@@ -27,7 +27,8 @@ def test_samples_beside_are_seen_along_the_rim_and_out_of_it(random):
     """In lengths of each; of other sheets, across a bay and past the window none counts, but the sample itself does."""
     points = np.array([[0, 0, 0], [3, 0.5, 0], [-2, -1, 0], [1, 3, 0], [0.5, 0, 1], [9, 0, 0]], float)
     normals = np.tile([0.0, 0, 1], (len(points), 1))
-    around = beside(np.array([0]), np.array([[0.0, 1, 0]]), np.array([2.0]), points, normals, KDTree(points), 4.0, 6)
+    cloud = Cloud.of(points, normals, np.ones(len(points)))
+    around = beside(np.array([0]), np.array([[0.0, 1, 0]]), np.array([2.0]), cloud, 4.0, 6)
     place = np.argsort(around.other[0])
     np.testing.assert_allclose(around.along[0, place], -points[:, 0] / 2)
     np.testing.assert_allclose(around.up[0, place], points[:, 1] / 2)
@@ -39,8 +40,8 @@ def test_of_each_bin_the_outermost_sample_is_kept(random):
     points = np.column_stack([random.uniform(-4, 4, 300), -random.random(300), np.zeros(300)])
     points[0] = 0
     normals = np.tile([0.0, 0, 1], (300, 1))
-    row, out = np.array([0]), np.array([[0.0, 1, 0]])
-    around = beside(row, out, np.ones(1), points, normals, KDTree(points), 4.0, 300)
+    row, out, cloud = np.array([0]), np.array([[0.0, 1, 0]]), Cloud.of(points, normals, np.ones(300))
+    around = beside(row, out, np.ones(1), cloud, 4.0, 300)
     along, up = around.outermost(4.0, 8)
     assert along[0, 0] == up[0, 0] == 0
     for bin_ in range(8):

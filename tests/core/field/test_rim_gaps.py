@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
 from core.field import rim_lines
+from core.field.cloud import Cloud
 from core.field.local_surface import fit_local_surface
 from core.field.rim_gaps import RimGaps, find_rim_gaps, spacing_around
 from core.points import local_spacing
@@ -33,8 +33,8 @@ def surface_of(points):
 
 
 def gaps_at(surface, row, outward):
-    around = spacing_around(row, surface.points, surface.spacing, surface.tree)
-    return find_rim_gaps(row, outward, *around, surface.points, surface.normals, surface.tree)
+    cloud = Cloud.of(surface.points, surface.normals, surface.spacing)
+    return find_rim_gaps(row, outward, *spacing_around(row, cloud), cloud)
 
 
 def below(surface, depth):
@@ -79,7 +79,8 @@ def test_rims_run_across_gaps_of_chance(monkeypatch):
 def test_the_rim_of_a_gap_may_lie_far_from_its_samples(monkeypatch):
     """More than a spacing and a half, beyond which nothing else is covered."""
 
-    def gaps(row, outward, usual, at_random, points, *_):
+    def gaps(row, outward, usual, at_random, cloud, *_):
+        points = cloud.points
         of = np.flatnonzero((abs(points[row, 0] - 0.5) < 2 * SPACING) & (points[row, 1] < 4 * SPACING))
         return RimGaps(of, np.tile([0.0, -1, 0], (len(of), 1)), points[row[of], 1])
 
@@ -145,8 +146,8 @@ def test_a_sheet_that_ends_at_another_has_no_deep_gaps_there():
     outward, normals = np.tile([0.0, -1, 0], (len(row), 1)), np.tile([0.0, 0, 1], (len(points), 1))
 
     def deepest(points, normals):
-        around = spacing_around(row, points, local_spacing(points), KDTree(points))
-        return find_rim_gaps(row, outward, *around, points, normals, KDTree(points)).depth.max()
+        cloud = Cloud.of(points, normals, local_spacing(points))
+        return find_rim_gaps(row, outward, *spacing_around(row, cloud), cloud).depth.max()
 
     both = np.concatenate([points, wall]), np.concatenate([normals, np.tile([0.0, 1, 0], (2500, 1))])
     assert deepest(points, normals) > 2 * SPACING
@@ -165,7 +166,8 @@ def test_signs_of_normals_do_not_matter(random):
 
 def test_without_rims_there_are_no_gaps():
     points = shapes.sphere(500)
-    none = find_rim_gaps(np.empty(0, int), np.empty((0, 3)), *np.empty((2, 0)), points, points, KDTree(points))
+    cloud = Cloud.of(points, points, local_spacing(points))
+    none = find_rim_gaps(np.empty(0, int), np.empty((0, 3)), *np.empty((2, 0)), cloud)
     assert len(none.of) == len(none.up) == 0
 
 
@@ -173,6 +175,7 @@ def test_without_rims_there_are_no_gaps():
 def test_random_samples_are_told_from_even_ones(points, random):
     """The usual spacing is the median, whatever the sample's own."""
     surface = surface_of(points)
-    usual, at_random = spacing_around(np.arange(100), surface.points, surface.spacing, surface.tree)
+    cloud = Cloud.of(surface.points, surface.normals, surface.spacing)
+    usual, at_random = spacing_around(np.arange(100), cloud)
     assert (at_random == random).mean() > 0.9
     np.testing.assert_allclose(usual, np.median(surface.spacing), rtol=0.3)

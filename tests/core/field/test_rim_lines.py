@@ -1,11 +1,10 @@
 """Rims by lines through the outermost samples, on shapes whose rims are known. Lengths are local spacings of 0.02."""
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from core.field.borders import RIM, find_rims
-from core.field.curvature import tangent_frames
-from core.field.local_surface import fit_local_surface, patch_neighbours
+from core.field.cloud import Cloud
+from core.field.local_surface import fit_local_surface
 from core.field.rim_lines import with_rim_lines
 from core.points import local_spacing
 from tests import shapes
@@ -19,10 +18,9 @@ def flat(points):
 
 def rims_of(points, normals, spacing):
     """Without lines and with them."""
-    tree = KDTree(points)
-    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
-    rims = find_rims(points, normals, frames, flat, spacing, patch_neighbours(tree), tree, 3.0)
-    return rims, with_rim_lines(rims, points, normals, spacing, tree)
+    cloud = Cloud.of(points, normals, spacing)
+    rims = find_rims(cloud, np.zeros((len(points), 3, 3)), 3.0)
+    return rims, with_rim_lines(rims, cloud)
 
 
 def scattered(n=2500, seed=0):

@@ -4,8 +4,9 @@ from scipy.spatial import KDTree
 
 from core.field import borders, sampling_gaps
 from core.field.borders import find_rims
-from core.field.curvature import bending, tangent_frames
-from core.field.local_surface import fit_local_surface, patch_neighbours
+from core.field.cloud import Cloud
+from core.field.curvature import bending
+from core.field.local_surface import fit_local_surface
 from core.field.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 from core.points import local_spacing
 from tests import shapes
@@ -14,29 +15,24 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def rims_of(points, normals):
-    """What looks at rims is given: rims, normals, local spacing, neighbours and the tree."""
-    normals = np.broadcast_to(normals, points.shape)
-    spacing, tree = local_spacing(points), KDTree(points)
-    neighbours = patch_neighbours(tree)
-    frames, flat = tangent_frames(normals), np.zeros((len(points), 3, 3))
-    rims = find_rims(points, normals, frames, flat, spacing, neighbours, tree, 3.0)
-    return rims, normals, spacing, neighbours, tree
+    """What looks at rims is given: rims and cloud."""
+    cloud = Cloud.of(points, np.broadcast_to(normals, points.shape), local_spacing(points))
+    return find_rims(cloud, np.zeros((len(points), 3, 3)), 3.0), cloud
 
 
 def before_and_after(points, normals, bend_times=1.0):
-    rims, normals, spacing, neighbours, tree = rims_of(points, normals)
-    bend = bend_times * bending(points, normals, tangent_frames(normals), spacing, neighbours)
-    return rims, with_sampling_gaps_bridged(rims, points, normals, bend, spacing, neighbours, tree, 3.0), spacing
+    rims, cloud = rims_of(points, normals)
+    return rims, with_sampling_gaps_bridged(rims, cloud, bend_times * bending(cloud), 3.0), cloud.spacing
 
 
 def with_and_without_openings_kept(points, normals):
-    rims, normals, spacing, neighbours, tree = rims_of(points, normals)
-    return with_openings_kept(rims, points, normals, spacing, neighbours, tree, 3.0), rims, spacing
+    rims, cloud = rims_of(points, normals)
+    return with_openings_kept(rims, cloud, 3.0), rims, cloud.spacing
 
 
 def with_and_without_sparser_parts_joined(points, normals):
-    rims, normals, spacing, neighbours, tree = rims_of(points, normals)
-    return with_sparser_parts_joined(rims, points, normals, spacing, neighbours, tree, 3.0), rims, spacing
+    rims, cloud = rims_of(points, normals)
+    return with_sparser_parts_joined(rims, cloud, 3.0), rims, cloud.spacing
 
 
 def sparser_to_one_side(points, ratio, random):

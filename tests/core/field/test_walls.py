@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from core.field.cloud import Cloud
 from core.field.walls import walled
 from tests.core.field.test_sampling_gaps import UP, before_and_after, rims_of
 
@@ -58,15 +59,14 @@ def test_gaps_as_wide_as_chance_leaves_them_are_not_bridged_across_drilled_holes
 @pytest.mark.parametrize(("walls", "least", "most"), [("down", 0.8, 1.0), ("crosses", 0.0, 0.4), (None, 0.0, 0.0)])
 def test_walls_count_beside_either_sample_and_sheets_that_cross_are_none(walls, least, most, random):
     points, normals, _ = slotted_plate(random, walls)
-    _, normals, spacing, neighbours, tree = rims_of(points, normals)
-    left, right = (tree.query([[side * 0.06, y, 0] for y in np.linspace(-0.9, 0.9, 41)])[1] for side in (-1, 1))
-    found = walled(left, right, points, normals, spacing, neighbours)
+    _, cloud = rims_of(points, normals)
+    left, right = (cloud.tree.query([[side * 0.06, y, 0] for y in np.linspace(-0.9, 0.9, 41)])[1] for side in (-1, 1))
+    found = walled(left, right, cloud)
     assert least <= found.mean() <= most
-    np.testing.assert_array_equal(found, walled(right, left, points, normals, spacing, neighbours))
+    np.testing.assert_array_equal(found, walled(right, left, cloud))
 
 
 @pytest.mark.parametrize(("place", "found"), [(-0.3, False), (0.5, True), (1.5, True), (2.3, False)])
 def test_a_wall_counts_between_two_samples_and_not_beyond_them(place, found):
     points, normals = np.array([[0.0, 0, 0], [2, 0, 0], [place, 0, -0.5]]), np.eye(3)[[2, 2, 0]]
-    others = np.array([[1, 2], [0, 2], [0, 1]])
-    assert walled(np.array([0]), np.array([1]), points, normals, np.ones(3), others) == found
+    assert walled(np.array([0]), np.array([1]), Cloud.of(points, normals, np.ones(3))) == found

@@ -1,0 +1,46 @@
+"""The samples with their normals, and those around each."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..linalg import tangent_frames
+from ..progress import Progress
+
+_NEIGHBOURS = 16  # of a sample, that its patch is fitted to
+_CHUNK = 16384  # samples
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """points, normals : (n,3) float64     spacing : (n,) float64, local spacing, units of the points
+
+    neighbours : (n,k) int, the samples that each one's patch is fitted to, nearest first
+    tree       : of the points
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    spacing: np.ndarray
+    neighbours: np.ndarray
+    tree: KDTree
+
+    @classmethod
+    def of(cls, points, normals, spacing, progress=None) -> "Cloud":
+        """With 16 neighbours, or all others where there are fewer."""
+        tree = KDTree(points)
+        k = min(_NEIGHBOURS, tree.n - 1) + 1
+        neighbours = np.empty((tree.n, k - 1), np.int64)
+        for part in Progress.of(progress).chunks(tree.n, _CHUNK):
+            neighbours[part] = tree.query(tree.data[part], k=k, workers=-1)[1][:, 1:]
+        return cls(points, normals, spacing, neighbours, tree)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @cached_property
+    def frames(self) -> np.ndarray:
+        """(n,2,3) float64: two unit tangents at each sample."""
+        return tangent_frames(self.normals)
