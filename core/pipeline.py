@@ -18,7 +18,7 @@ from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
 from .parallel import in_order
-from .points import local_spacing, prepare_samples
+from .points import local_spacing, prepare_samples, rounding_warning
 from .progress import Progress, watched
 from .reconstruction import Reconstruction
 from .settings import WHOLE_BOX, Settings
@@ -72,7 +72,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
     stages = _Stages()
     with stages("points"):
         samples = prepare_samples(points, progress.part(0.0, 0.01, "points")).in_spatial_order()
-        given = len(np.asarray(points))
+        given, unmoved = len(np.asarray(points)), samples.given
 
     with stages("cleaning"):
         cleaning = {}
@@ -123,7 +123,14 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "seconds": stages.seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": [*samples.warnings, *ignored, *large, *_too_coarse(spacing, grid), *surfaces.warnings],
+        "warnings": [
+            *samples.warnings,
+            *rounding_warning(unmoved, float(np.median(spacing)) * samples.scale),
+            *ignored,
+            *large,
+            *_too_coarse(spacing, grid),
+            *surfaces.warnings,
+        ],
     }
     progress.part(0.0, 1.0, "report")(1.0)
     row = samples.given_order()

@@ -16,6 +16,7 @@ SPACING_NEIGHBOURS = 6
 _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
 _CHUNK = 16384  # samples
+_ROUNDED, _ODD = 0.02, 0.25  # steps of coordinates, local spacings, that are told; share of odd numbers of these steps
 _FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
 
@@ -137,6 +138,24 @@ def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
     for part in Progress.of(progress).chunks(len(points), _CHUNK):
         spacing[part] = tree.query(points[part], k=k + 1, workers=-1)[0][:, 1:].mean(axis=1)
     return spacing
+
+
+def rounding_warning(points: np.ndarray, spacing: float) -> tuple[str, ...]:
+    """Says, in one line or none, that coordinates of points (n,3), float64, were rounded to the steps that single
+    precision has so far from the origin, and that these are not small beside the `spacing` of the points."""
+    size = np.median(np.abs(points), axis=0)
+    axis = size.argmax()
+    if size[axis] > np.finfo(np.float32).max:
+        return ()
+    step = float(np.spacing(np.float32(size[axis])))
+    steps = points[:, axis] / step
+    even = np.rint(0.5 * steps) == 0.5 * steps
+    if step < _ROUNDED * spacing or (np.rint(steps) != steps).any() or even.mean() > 1 - _ODD:
+        return ()
+    return (
+        f"coordinates around {size[axis]:g} are in steps of {step:.2g}, {step / spacing:.0%} of the points' spacing: "
+        "single precision has no finer ones so far out; bring the points closer to the origin before they are stored in it",
+    )
 
 
 def first_of_each(points, rows):

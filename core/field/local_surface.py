@@ -11,6 +11,7 @@ from ..progress import Progress
 from .borders import Rims, find_rims
 from .cloud import Cloud
 from .curvature import bending
+from .grid import Grid
 from .line_gaps import with_line_gaps_bridged
 from .patches import Patches
 from .projection import NEAREST, Projection, project
@@ -64,6 +65,10 @@ class LocalSurface:
     def project(self, x: np.ndarray, progress=None, nearest: int = NEAREST) -> Projection:
         """Where queries (m,3) close to the surface fall on it, see :func:`project`."""
         return project(self, x, Progress.of(progress), nearest)
+
+    def spacing_in_cells(self, grid: Grid) -> float:
+        """The median local spacing, cells."""
+        return float(np.median(self.spacing)) / grid.spacing
 
     def around(self, places: np.ndarray) -> np.ndarray:
         """The samples around places (m,3), whose median spacing is that of the place: the nearest 32, or all where

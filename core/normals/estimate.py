@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import InputError, SettingsError
 from ..given_arrays import finite_points, real_numbers, spacing_of
+from ..linalg import row_dots
 from ..points import MINIMUM_SAMPLES
 from ..progress import Progress
 from ..settings import Settings
@@ -20,6 +21,8 @@ from .known import unit_axes
 from .mirrors import Mirrors
 from .pca import pca_normals
 from .reflection import reflection_sweeps
+
+_SAME_AXIS = 1 - 1e-9  # least |a . b| of unit axes that one row may be given
 
 
 def estimate_normals(points, spacing, settings: Settings = Settings(), constraints=None, progress=None):
@@ -93,7 +96,8 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
     None, or none of them, gives None.
 
     Rows that were dropped (duplicates, strays, NaN) are ignored, which is what the warning says. Raises
-    :class:`InputError` for shapes that do not match, rows outside the input, or axes without a direction.
+    :class:`InputError` for shapes that do not match, rows outside the input, rows with more than one axis, or axes
+    without a direction.
     """
     if constraints is None:
         return None, ()
@@ -116,6 +120,7 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
             f"give rows from 0 to {count - 1}"
         )
     axes = unit_axes(axes, "constraint axes")
+    _refuse_two_axes(indices, axes)
     position = np.full(count, -1)
     position[source_index] = np.arange(len(source_index))
     rows = position[indices.astype(np.int64)]
@@ -124,3 +129,11 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
     if not used.all():
         warnings = (f"{(~used).sum()} of {len(used)} constraints ignored: their points were dropped",)
     return (rows[used], axes[used]), warnings
+
+
+def _refuse_two_axes(indices, axes):
+    order = np.argsort(indices, kind="stable")
+    agreement = np.abs(row_dots(axes[order[1:]], axes[order[:-1]]))
+    differ = np.flatnonzero((np.diff(indices[order]) == 0) & (agreement < _SAME_AXIS))
+    if len(differ):
+        raise InputError(f"row {indices[order[differ[0]]]} is constrained to axes that differ; give each row one")

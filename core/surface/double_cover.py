@@ -43,7 +43,7 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     room = padding_cells(max(grid.shape) - 1)
     if not 0 < offset <= room:
         raise SettingsError(f"offset is {offset:g}; it must be above 0 and at most {room:g} cells, the room in the box")
-    raised = offset + _RAISED * max(0.0, float(np.median(surface.spacing)) / grid.spacing - SPARSE)
+    raised = offset + _RAISED * max(0.0, surface.spacing_in_cells(grid) - SPARSE)
     return max(offset, _CLOSEST, min(raised, _WITHIN * room))
 
 
@@ -94,7 +94,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = spanned(vertices, faces, loose)
     mesh = mesh_of(vertices, faces)
     progress(0.8)
-    dense = np.median(surface.spacing) < DENSE * grid.spacing
+    dense = surface.spacing_in_cells(grid) < DENSE
     mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))
     progress(0.9)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)

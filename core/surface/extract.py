@@ -33,7 +33,7 @@ _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _THROUGH = 0.125  # of those, at least: sheets that pass through each other
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
-_PARTED = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
+_SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Surfaces:
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
     needed = settings.band
-    if settings.surface in WITH_SIDES or (settings.surface == "double" and _spacing_in_cells(local, grid) <= _SPARSEST):
+    if settings.surface in WITH_SIDES or (settings.surface == "double" and local.spacing_in_cells(grid) <= _SPARSEST):
         needed = max(needed, needed_band(local, grid))
     if settings.surface in ("double", "both", "single"):
         needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
@@ -142,7 +142,7 @@ class _Layers:
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one with handles; sheets side by
         side have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
-        cells = _spacing_in_cells(self.local, self.grid)
+        cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
         if self.meetings.share <= _FEW:
@@ -164,22 +164,17 @@ class _Layers:
             return not self.meetings.side_by_side and self._at_meetings(sheet.vertices[line]) >= _SEEN
         if pieces_touch(sheet, self.grid.spacing):
             return False
-        return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _PARTED
+        return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT
 
     def _at_meetings(self, places):
         """The share of places (m,3), at least one, whose nearest samples are where sheets meet."""
         return self.meetings.at[self.local.tree.query(places)[1]].mean()
 
 
-def _spacing_in_cells(local, grid):
-    """The median local spacing."""
-    return float(np.median(local.spacing)) / grid.spacing
-
-
 def _said_of_torn(local, grid):
     """Why there is a double cover in place of a single layer, and what helps: no finer grid where points lie many cells
     apart."""
-    cells = _spacing_in_cells(local, grid)
+    cells = local.spacing_in_cells(grid)
     if cells > SPARSE:
         return (
             f"points {cells:.2g} cells apart are too few to tell sheets apart, where a single layer is torn: the "

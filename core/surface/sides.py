@@ -170,7 +170,7 @@ def needed_band(surface: LocalSurface, grid: Grid) -> float:
 
 def _far(surface, grid):
     """Cells from the surface where regions start."""
-    far = 0.5 * surface.bridge * float(np.median(surface.spacing)) / grid.spacing
+    far = 0.5 * surface.bridge * surface.spacing_in_cells(grid)
     return float(np.clip(far, _NEAREST, _FARTHEST))
 
 

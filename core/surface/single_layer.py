@@ -30,7 +30,7 @@ from .zero_set import sharpened
 
 _MENDED = 2  # times, since holes may show where scraps are gone
 _BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
-_PARTED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
+_BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
 
 
 def single_layer(
@@ -104,7 +104,7 @@ def sheet_of_crossings(
     found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
     found, left = _finished(found, surface, grid, progress.part(0.9, 1.0))
     parted = _borders_beside(lines, found, grid.spacing)
-    replaces = not (left or parted or len(_lines(found))) if chance else parted <= _PARTED * len(lines)
+    replaces = not (left or parted or len(_lines(found))) if chance else parted <= _BORDERED * len(lines)
     return (found, left) if replaces else (sheet, unoriented)
 
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from core import InputError, denoise, fit_grid, remove_outliers
-from core.points import local_spacing, prepare_samples
+from core.points import local_spacing, prepare_samples, rounding_warning
 from tests import shapes
 
 TETRAHEDRON = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -160,3 +160,19 @@ def test_single_stages_take_lists_and_integers_and_refuse_what_is_no_cloud():
         local_spacing([[0, 0, 0]])
     with pytest.raises(InputError, match="not all in one place"):
         fit_grid(np.ones((5, 3)), 16)
+
+
+@pytest.mark.parametrize(("shift", "told"), [(0, False), (3e4, False), (4e5, True), (3e7, True)])
+def test_coordinates_that_single_precision_rounded_are_told(shift, told):
+    points = 10 * shapes.scattered_sphere(2000) + [shift, 0, 0]
+    spacing = float(np.median(local_spacing(points)))
+    warning = rounding_warning(points.astype(np.float32).astype(float), spacing)
+    assert bool(warning) == told
+    assert not told or f"in steps of {np.spacing(np.float32(shift)):.2g}" in warning[0]
+    assert not rounding_warning(points, spacing)
+
+
+@pytest.mark.parametrize("far", [0, 1e6, 1e9, 1e300])
+def test_whole_numbers_are_no_rounded_ones(far):
+    points = np.stack(np.meshgrid(*[np.arange(8.0)] * 3), axis=-1).reshape(-1, 3) + far
+    assert not rounding_warning(points, 1.0)

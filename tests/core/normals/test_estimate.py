@@ -135,11 +135,18 @@ def test_constraints_on_dropped_points_are_reported():
         (([0, 1], [[1, 0, 0], [0, np.inf, 0]]), "^1 constraint axes have no direction"),
         (([0, 4], [[1, 0, 0], [0, 1, 0]]), "1 constraints are for rows outside the input, row 4 the first.* 0 to 3"),
         (([-1], [[1, 0, 0]]), "row -1 the first"),
+        (([2, 0, 2], [[1, 0, 0], [1, 0, 0], [1, 1, 0]]), "row 2 is constrained to axes that differ"),
     ],
 )
 def test_unusable_constraints_are_refused(constraints, message):
     with pytest.raises(InputError, match=message):
         checked_constraints(constraints, np.arange(4), 4)
+
+
+def test_one_axis_may_be_given_twice_whatever_its_sign_and_length():
+    (rows, axes), _ = checked_constraints(([2, 2], [[1, 1, 0], [-3, -3, 0]]), np.arange(4), 4)
+    np.testing.assert_array_equal(rows, [2, 2])
+    np.testing.assert_allclose(np.abs(axes), np.sqrt([[0.5, 0.5, 0]] * 2))
 
 
 def test_plane_fit_baseline_is_exact_on_a_plane_and_unsure_in_a_volume(random):
