@@ -154,7 +154,7 @@ def rounding_warning(points: np.ndarray, spacing: float) -> tuple[str, ...]:
         return ()
     return (
         f"coordinates around {size[axis]:g} are in steps of {step:.2g}, {step / spacing:.0%} of the points' spacing: "
-        "single precision has no finer ones so far out; bring the points closer to the origin before they are stored in it",
+        "single precision has no finer ones so far out; bring points closer to the origin before they are stored in it",
     )
 
 
