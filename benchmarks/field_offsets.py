@@ -3,8 +3,8 @@
 import numpy as np
 
 from core import DistanceField, Mesh, Settings, reconstruct
-from core.surface.isosurface import isosurface
-from core.surface.triangles import triangles
+from core.surface.meshing.isosurface import isosurface
+from core.surface.meshing.triangles import triangles
 
 from .cases import Case
 from .field_lines import cut_nodes

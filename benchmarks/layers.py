@@ -10,8 +10,8 @@ import numpy as np
 from core import Mesh, Settings, reconstruct
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
-from core.surface import double_cover
-from core.surface.centring import centred
+from core.surface.double import double_cover
+from core.surface.meshing.centring import centred
 
 from .cases import SAMPLINGS, find_cases, has_sampling, load_case
 from .geometry import face_normals, surface_samples

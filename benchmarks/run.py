@@ -12,7 +12,7 @@ from threading import Event
 
 from core import Settings, reconstruct
 from core.memory import peak_memory_mb
-from core.surface.quality import triangle_quality
+from core.surface.meshing.quality import triangle_quality
 
 from . import kept
 from .against import best_peer

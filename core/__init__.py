@@ -19,13 +19,13 @@ _PUBLIC = {
     "reconstruction": ("Reconstruction",),
     "settings": ("Settings",),
     "surface.attributes": ("vertex_attributes",),
-    "surface.both_sides": ("both_sides",),
-    "surface.crossings": ("find_crossings",),
-    "surface.double_cover": ("double_cover",),
+    "surface.double.both_sides": ("both_sides",),
+    "surface.edges.crossings": ("find_crossings",),
+    "surface.double.double_cover": ("double_cover",),
     "surface.mesh": ("Mesh",),
-    "surface.sides": ("find_sides",),
+    "surface.signs.sides": ("find_sides",),
     "surface.signed": ("signed_distance",),
-    "surface.single_layer": ("single_layer",),
+    "surface.single.single_layer": ("single_layer",),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}
 __all__ = sorted(_HOME)

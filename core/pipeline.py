@@ -23,8 +23,8 @@ from .progress import Progress, watched
 from .reconstruction import Reconstruction
 from .settings import WHOLE_BOX, Settings
 from .surface.extract import Surfaces, band_for, extract_surfaces
-from .surface.pieces import piece_count
-from .surface.quality import quad_quality, triangle_quality
+from .surface.meshing.pieces import piece_count
+from .surface.meshing.quality import quad_quality, triangle_quality
 
 _COARSE = 0.1  # cells, median local spacing below which a warning says that the grid is too coarse for the points
 _FACTS = (

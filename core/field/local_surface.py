@@ -8,15 +8,15 @@ from scipy.spatial import KDTree
 
 from ..linalg import COMPONENTS
 from ..progress import Progress
-from .borders import Rims, find_rims
 from .cloud import Cloud
 from .curvature import bending
 from .grid import Grid
-from .line_gaps import with_line_gaps_bridged
 from .patches import Patches
 from .projection import NEAREST, Projection, project
-from .rim_lines import with_rim_lines
-from .sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
+from .rims.borders import Rims, find_rims
+from .rims.line_gaps import with_line_gaps_bridged
+from .rims.rim_lines import with_rim_lines
+from .rims.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 
 _AROUND = 32  # samples, whose median spacing is that of a place
 

@@ -6,9 +6,9 @@ from scipy.ndimage import distance_transform_edt
 from ..linalg import outer_sum
 from ..parallel import work_through
 from ..progress import Progress
-from .borders import DISC
 from .grid import Grid, node_strides
 from .local_surface import LocalSurface
+from .rims.borders import DISC
 
 _MARGIN = 0.1  # cells, for surfaces blended of patches that differ
 _PIECE = 1 << 18  # pairs of sample and node at a time

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..linalg import dots
-from .borders import DISC, OPPOSITE, Rims
+from .rims.borders import DISC, OPPOSITE, Rims
 
 _STEEPEST = 0.999  # change of a margin along an edge, where one disc holds the other
 _TINY = np.finfo(np.float32).tiny

@@ -1,0 +1,8 @@
+"""Stage three, from distances to meshes; :mod:`.extract` says which one is made how.
+
+edges   : which edges of the grid the surface crosses, and where sheets meet
+signs   : which side of it nodes lie on, and where such signed distances are zero
+single  : the single layer, by signs where there are two sides, by crossed edges elsewhere, and its borders
+double  : the double cover, as both sides of a single layer, or extracted at an offset
+meshing : what any mesh needs: iso-surfaces, even faces, pieces, quality
+"""

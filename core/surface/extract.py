@@ -11,18 +11,18 @@ from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
 from ..settings import WITH_SIDES, Settings
-from .both_sides import both_sides
-from .crossings import Crossings, find_crossings
-from .double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
-from .isosurface import need_quads
-from .meetings import Meetings, find_meetings
+from .double.both_sides import both_sides
+from .double.double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
+from .double.ridges import ridge_share
+from .edges.crossings import Crossings, find_crossings
+from .edges.meetings import Meetings, find_meetings
 from .mesh import Mesh
-from .misfit import askew, distances
-from .pieces import pieces_touch, without_small_pieces
-from .ridges import ridge_share
-from .sides import Sides, find_sides, may_be_closed, needed_band
+from .meshing.isosurface import need_quads
+from .meshing.misfit import askew, distances
+from .meshing.pieces import pieces_touch, without_small_pieces
 from .signed import signed_distance, signed_mesh
-from .single_layer import sheet_of_crossings, sheet_of_sides
+from .signs.sides import Sides, find_sides, may_be_closed, needed_band
+from .single.single_layer import sheet_of_crossings, sheet_of_sides
 
 _TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
 _ASKEW = 0.1  # of the area of a single layer, the same where faces are turned away from the samples
@@ -192,10 +192,10 @@ def extract_surfaces(
     """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
     :func:`band_for` says, and the nodes near the surface.
 
-    The double cover is both sides of the single layer, see :mod:`.both_sides`, unless sheets pass through each other or
-    run side by side, or meet where samples do not show it, or samples are sparse, or so dense that chords are most of
-    the error, of which two layers extracted apart have less, and no sheets run close; then it is extracted at an
-    offset, see :mod:`.double_cover`.
+    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
+    other or run side by side, or meet where samples do not show it, or samples are sparse, or so dense that chords are
+    most of the error, of which two layers extracted apart have less, and no sheets run close; then it is extracted at
+    an offset, see :mod:`.double.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

@@ -1,7 +1,7 @@
 """Signed distance of closed shapes.
 
 The paper's appendix orients the samples and integrates a second time with oriented normals. Here the distances exist
-already and only their sides are missing (see :mod:`.sides`).
+already and only their sides are missing (see :mod:`.signs.sides`).
 """
 
 import numpy as np
@@ -12,15 +12,15 @@ from ..field.blocks import Blocks, each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
-from .centring import centred
-from .evening import evened
 from .mesh import Mesh
-from .pieces import pieces_with_samples
-from .settling import settled
-from .sides import Sides
-from .thin_parts import find_thin_parts
-from .triangles import mesh_of
-from .zero_set import sharpened, zero_set
+from .meshing.centring import centred
+from .meshing.evening import evened
+from .meshing.pieces import pieces_with_samples
+from .meshing.triangles import mesh_of
+from .signs.sides import Sides
+from .signs.thin_parts import find_thin_parts
+from .signs.zero_set import sharpened, zero_set
+from .single.settling import settled
 
 _CLAMP = 3.0  # cells; farther values do not matter for the mesh
 _SMOOTHING = 20  # rounds, over gaps
@@ -42,8 +42,8 @@ def signed_mesh(values, surface: LocalSurface, grid: Grid, progress=None) -> Mes
     """The zero set of signed distances, (nx,ny,nz) float32 or Blocks, pulled onto the surface where that is within a
     cell, and smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards.
 
-    Near parts that the signs of nodes do not show (see :mod:`.thin_parts`) the mesh starts off the surface, as a double
-    cover does: around what is too thin, inside of slits. So flaps and inner walls have a face on either side.
+    Near parts that the signs of nodes do not show (see :mod:`.signs.thin_parts`) the mesh starts off the surface, as a
+    double cover does: around what is too thin, inside of slits. So flaps and inner walls have a face on either side.
     """
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from core import Cancelled, DistanceField, InputError, Mesh, Settings, reconstruct
 from core.points import local_spacing
-from core.surface.quality import quad_quality, triangle_quality
+from core.surface.meshing.quality import quad_quality, triangle_quality
 from tests import shapes
 
 DATA = Path(__file__).parents[1] / "data"

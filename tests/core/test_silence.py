@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from core import points as core_points
-from core.cleaning import outliers, quadrics
+from core.cleaning import outliers, quadrics, surroundings
 from core.cleaning.positions import denoise
-from core.field import borders, curvature, local_surface
+from core.field import cloud, curvature, local_surface
+from core.field.rims import borders
 from core.points import local_spacing
 from tests import shapes
 
@@ -40,9 +41,9 @@ def looks_and_results(stage):
     ("stage", "module", "name", "size"),
     [
         ("spacing", core_points, "_CHUNK", CHUNK),
-        ("outliers", outliers, "_CHUNK", CHUNK),
+        ("outliers", surroundings, "_CHUNK", CHUNK),
         ("denoising", quadrics, "_QUERIED", 12 * CHUNK),
-        ("patches", local_surface, "_CHUNK", CHUNK),
+        ("patches", cloud, "_CHUNK", CHUNK),
         ("patches", curvature, "_CHUNK", CHUNK),
         ("patches", borders, "_CHUNK", CHUNK),
     ],

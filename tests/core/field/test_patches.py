@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from core.field.borders import DISC, OPPOSITE, Rims
 from core.field.patches import Patches
+from core.field.rims.borders import DISC, OPPOSITE, Rims
 
 
 @pytest.fixture

@@ -104,6 +104,6 @@ def test_without_openvdb_the_message_names_the_ways_out(monkeypatch):
     def missing():
         raise MissingDependency("OpenVDB is not installed")
 
-    monkeypatch.setattr(importlib.import_module("core.surface.isosurface"), "load_openvdb", missing)
+    monkeypatch.setattr(importlib.import_module("core.surface.meshing.isosurface"), "load_openvdb", missing)
     with pytest.raises(MissingDependency, match=r"quads need OpenVDB.*faces='triangles'"):
         reconstruct(shapes.sphere(200), Settings(resolution=16, faces="quads"))

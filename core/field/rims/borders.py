@@ -1,0 +1,246 @@
+"""Where patches end: at rims of open sheets, at creases, and not at gaps that are to be bridged.
+
+The printed method has no borders: on a flat patch the diffused axes are constant and the zero set is the whole plane.
+Here a sample whose neighbours leave a wide gap around it, seen in its tangent plane, is at a rim. Across the gap the
+sheet ends a little past the two neighbours that bound it, unless the gap is narrower than the bridging length and no
+wall stands beside it.
+
+Neighbours beyond a crease are unfolded about the line where the two tangent planes meet, so they fill gaps like any
+other, and that line is where the patch ends, unless the sheet goes on straight (two sheets that cross).
+"""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ...linalg import row_dots
+from ...parallel import in_order
+from ...progress import Progress
+from ..cloud import Cloud
+from ..curvature import sag
+from .walls import walled
+
+GAP = np.radians(130)
+DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
+RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
+OPPOSITE = float(np.cos(GAP / 2))  # least cosine, to the direction opposite to a gap, of what lies there
+_BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
+
+_FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
+_STEP = 0.35  # they may be off each other's plane by this share of their distance
+_FOLD = 0.87  # largest |n_i . n_j| of neighbours with a fold between them
+_FOLD_REACH = 1.5  # both are this close to the crease, local spacings
+_CHUNK = 1024  # samples
+_PAIRS = 500_000
+_STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
+_OWN = 0.77  # if their |n_i . n_j| is more than this: at 45 degrees those beyond the crease lie flat, too
+
+
+@dataclass(frozen=True)
+class Rims:
+    """The widest gap around each sample and the creases beside it, in its tangent plane.
+
+    gap       : (n,) bool, whether there is one
+    bridged   : (n,) bool, whether the surface goes on across it
+    outward   : (n,3) float64, unit direction of the gap's middle
+    opening   : (n,) float64, cosine of half its angle
+    beside    : (n,2) int64, the two neighbours that bound it     ends : (n,2,3) float64, steps to them
+    margin    : (n,3) float64, how far the sheet goes on past the sample and past those two neighbours, at rims
+    reach     : (n,) float64, how far the patch covers a bridged gap, or up to a rim across a gap in the sampling
+    behind    : (n,) float64, how far it covers a gap opposite to that one, at lines of samples; 0 elsewhere
+    crease    : (n,2,3) float64, unit directions towards the two nearest creases that differ; any where there is none
+    limit     : (n,2) float64, distance to them, inf where there is none
+    """
+
+    gap: np.ndarray
+    bridged: np.ndarray
+    outward: np.ndarray
+    opening: np.ndarray
+    beside: np.ndarray
+    ends: np.ndarray
+    margin: np.ndarray
+    reach: np.ndarray
+    behind: np.ndarray
+    crease: np.ndarray
+    limit: np.ndarray
+
+    @cached_property
+    def farthest(self) -> np.ndarray:
+        """(n,) how far the patch covers gaps to either side."""
+        return np.maximum(self.reach, self.behind)
+
+
+def find_rims(cloud: Cloud, bend, bridge: float, progress=None) -> Rims:
+    """Gaps wider than 130 degrees between neighbours of one sheet, sorted by angle in the tangent plane.
+
+    bend   : (n,3,3) float64 of the patches, which may bend towards each other over a gap
+    bridge : gaps up to this many local spacings are crossed
+    """
+    chunks = Progress.of(progress).chunks(len(cloud), rows_at_a_time(bridge, len(cloud)))
+    found = [rims for _, rims in in_order(lambda part: _find_rims(part, cloud, bend, bridge), chunks)]
+    return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
+
+
+def _find_rims(part, cloud, bend, bridge):
+    points, normals, frames = cloud.points, cloud.normals, cloud.frames[part]
+    spacing, neighbours = cloud.spacing[part], cloud.neighbours[part]
+    n, k = neighbours.shape
+    own, theirs = normals[part], normals[neighbours]
+    step = points[neighbours] - points[part, None]
+    flat = one_sheet(step, own[:, None], theirs)
+    same, laid, crease, limit = _laid_flat(step, own, theirs, spacing, flat)
+    x, y = np.moveaxis(np.einsum("nki,nai->nka", laid, frames), 2, 0)
+
+    angle = np.where(same, np.arctan2(y, x), np.inf)
+    order = np.argsort(angle, axis=1)
+    angle = np.take_along_axis(angle, order, axis=1)
+    count = same.sum(axis=1)
+    every = np.arange(n)
+    last = np.maximum(count - 1, 0)
+    following = np.concatenate([angle[:, 1:], angle[:, :1]], axis=1)
+    following[every, last] = angle[:, 0] + 2 * np.pi
+    with np.errstate(invalid="ignore"):
+        width = np.where(np.isfinite(angle), following - angle, 0.0)
+    widest = width.argmax(axis=1)
+    width = width[every, widest]
+    start = np.where(count > 0, angle[every, widest], 0.0)
+
+    bounding = np.stack([order[every, widest], order[every, np.where(widest == last, 0, widest + 1) % k]], axis=1)
+    ends = np.stack([np.take_along_axis(x, bounding, axis=1), np.take_along_axis(y, bounding, axis=1)], axis=2)
+    middle = start + width / 2
+    outward = np.einsum("na,nai->ni", np.stack([np.cos(middle), np.sin(middle)], axis=1), frames)
+    gap = (width > GAP) & (count > 0)
+    distance = np.full(n, np.inf)
+    rows = np.flatnonzero(gap)
+    distance[rows], other = across_gaps(part.start + rows, outward[rows], cloud, bridge, bend=bend)
+    bridged = np.isfinite(distance)
+    rows, other = rows[bridged[rows]], other[bridged[rows]]
+    bridged[rows] = ~walled(part.start + rows, other, cloud)
+    reach = np.zeros(n)
+    reach[bridged] = bridged_reach(distance[bridged], spacing[bridged])
+    ends = np.einsum("nea,nai->nei", ends, frames)
+    beside = np.take_along_axis(neighbours, bounding, axis=1)
+    margin = np.repeat(RIM * spacing[:, None], 3, axis=1)
+    return Rims(gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, np.zeros(n), crease, limit)
+
+
+def one_sheet(step, normals, other_normals) -> np.ndarray:
+    """Whether samples with steps (...,3) between them lie on one sheet that is nearly flat there, (...) bool."""
+    return _level(step, normals, other_normals) & _aligned(normals, other_normals, _FLAT)
+
+
+def _level(step, normals, other_normals, step_up=_STEP, above=0.0, above_back=0.0):
+    """Whether both ends of steps (...,3) are off each other's tangent plane, or what lies so far above it there (...),
+    by less than this share of their length."""
+    height = np.abs(row_dots(step, normals) - above)
+    height_back = np.abs(row_dots(step, other_normals) + above_back)
+    return np.maximum(height, height_back) < step_up * np.linalg.norm(step, axis=-1)
+
+
+def _aligned(normals, other_normals, least):
+    return np.abs(row_dots(normals, other_normals)) > least
+
+
+def _laid_flat(step, own, theirs, spacing, flat):
+    """Which neighbours are of one sheet, those beyond folds as well, (n,k); steps to them in the sample's tangent plane
+    or, of those that are not beyond a fold, in space, (n,k,3); and the creases, see :func:`_creases`."""
+    n = len(step)
+    same, laid, crease, limit = flat.copy(), step.copy(), np.zeros((n, 2, 3)), np.full((n, 2), np.inf)
+    bent = np.flatnonzero((~flat & ~_aligned(own[:, None], theirs, _FOLD)).any(axis=1))
+    if len(bent):
+        step, own, theirs, spacing, flat = step[bent], own[bent], theirs[bent], spacing[bent], flat[bent]
+        folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, ~flat)
+        level = flat & _aligned(own[:, None], theirs, _OWN)
+        crease[bent], limit[bent] = _creases(step, level, folded, toward, line, spacing)
+        laid[bent] = np.where(folded[..., None], lateral, step)
+        same[bent] |= folded
+    return same, laid, crease, limit
+
+
+def _unfolded(step, normals, other_normals, spacing, candidate):
+    """Neighbours beyond a fold, laid out in the sample's tangent plane.
+
+    Returns whether each is one (n,k), its unfolded step (n,k,3), the unit tangent towards the crease (n,k,3) and the
+    distance to the crease (n,k).
+    """
+    cosine = np.einsum("nki,ni->nk", other_normals, normals)
+    across = other_normals - cosine[..., None] * normals[:, None]
+    sine = np.linalg.norm(across, axis=2)
+    folded = candidate & (np.abs(cosine) < _FOLD)
+    sine = np.where(folded, sine, 1.0)
+    across = across / sine[..., None]
+    line = row_dots(step, other_normals) / sine
+    other_line = np.abs(np.einsum("nki,ni->nk", step, normals)) / sine
+    across = across * np.where(line < 0, -1.0, 1.0)[..., None]
+    line = np.abs(line)
+    reach = _FOLD_REACH * spacing[:, None]
+    folded &= (line < reach) & (other_line < reach)
+    along = np.cross(normals[:, None], across)
+    slide = row_dots(step, along)
+    return folded, (line + other_line)[..., None] * across + slide[..., None] * along, across, line
+
+
+def _creases(step, own, folded, toward, line, spacing):
+    """The nearest crease that no neighbour of the `own` sheet, (n,k) bool, lies beyond, and the nearest one in another
+    direction, (n,2,3), with their distances, (n,2)."""
+    margin = line + _STRAIGHT_ON * spacing[:, None]
+    runs = np.einsum("nji,nki->njk", step, toward)
+    crossed = ((runs > margin[:, None]) & own[:, :, None]).any(axis=1)
+    distance = np.where(folded & ~crossed, line, np.inf)
+    every = np.arange(len(step))
+    first = distance.argmin(axis=1)
+    other = np.einsum("nki,ni->nk", toward, toward[every, first]) < np.cos(np.pi / 4)
+    second = np.where(other, distance, np.inf).argmin(axis=1)
+    chosen = np.stack([first, second], axis=1)
+    limit = np.stack([distance[every, first], np.where(other, distance, np.inf)[every, second]], axis=1)
+    return np.take_along_axis(toward, chosen[..., None], axis=1), limit
+
+
+def _within(bridge, n):
+    """How many samples, of n, there may be in a disc of the bridging length, with a margin."""
+    return min(n, int(4 * bridge**2) + 8)
+
+
+def across_gaps(rows, outward, cloud: Cloud, bridge: float, spacing=None, step_up=_STEP, most=None, bend=None):
+    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings, or
+    of those given (m,), away and off the tangent plane, or the patch that `bend` (n,3,3) says where given, by less than
+    the share `step_up` of that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most`
+    nearest samples where given."""
+    points, normals = cloud.points, cloud.normals
+    spacing = cloud.spacing[rows] if spacing is None else spacing
+    distance, other = cloud.tree.query(points[rows], k=min(_within(bridge, len(cloud)), most or len(cloud)))
+    step = points[other] - points[rows, None]
+    ahead = np.einsum("nki,ni->nk", step, outward) > 0.8 * distance
+    near = (distance > 0) & (distance < bridge * spacing[:, None])
+    sheet = _aligned(normals[rows, None], normals[other], 0.5)
+    ends = step, normals[rows, None], normals[other], step_up
+    level = _level(*ends)
+    if bend is not None:
+        level |= _level(*ends, sag(step, bend[rows, None]), sag(step, bend[other]))
+    sheet &= level
+    distance = np.where(ahead & near & sheet, distance, np.inf)
+    nearest = np.arange(len(rows)), distance.argmin(axis=1)
+    return distance[nearest], other[nearest]
+
+
+def rows_at_a_time(bridge: float, n: int) -> int:
+    """Samples, of n, whose gaps can be looked across at a time, see :func:`across_gaps`."""
+    return min(_CHUNK, max(1, _PAIRS // _within(bridge, n)))
+
+
+def bridged_reach(distance, spacing) -> np.ndarray:
+    """How far patches cover gaps of width `distance` (m,) that are bridged, (m,)."""
+    return np.maximum(DISC * spacing, _BRIDGED * distance)
+
+
+def chain_lengths(rims: Rims, marked) -> np.ndarray:
+    """Of the samples marked, (n,) bool, how many there are in a row with each, one bounding the next one's gap, (n,);
+    1 for those that are not marked."""
+    n = len(marked)
+    tail, head = np.repeat(np.flatnonzero(marked), 2), rims.beside[marked].reshape(-1)
+    tail, head = tail[marked[head]], head[marked[head]]
+    _, chain = connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)
+    return np.bincount(chain)[chain]

@@ -1,0 +1,153 @@
+"""The double cover of a sheet: both its sides, joined at its borders and around the edges where sheets meet."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...linalg import cross, lengths
+from ..mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
+from .around_edges import corner_after, order_around
+from .layers import HAIR
+
+
+def both_sides(sheet: Mesh, cell: float) -> Mesh:
+    """A closed mesh with a layer on either side of a sheet, wound so that normals point away from it: an outer and an
+    inner piece for a closed one with two sides, a single piece for an open one, whose layers meet in its border
+    vertices, and for a one-sided one; where sheets meet, a piece for each region that they part.
+
+    sheet : any, wound alike or not     cell : length of one, in the units of the mesh
+
+    The layers are a hair apart, 3e-4 cells. Around an edge, those sides of its faces are joined that face each other.
+    Where two pairs of them have the same vertices at both its ends, as where these are on a border, they are joined in
+    two halves, and where parts of the sheet touch in a vertex each gets its own, so that every edge of the result has
+    two faces and those around a vertex form one fan.
+    """
+    if not len(sheet.faces):
+        return sheet
+    sheet = _turned(sheet)
+    sides = _sides(sheet)
+    place = np.empty(sides.vertex.max(initial=-1) + 1, sheet.faces.dtype)
+    place[sides.vertex] = sheet.faces
+    vertices = np.concatenate([sheet.vertices[place], sheet.vertices[sides.halved].mean(axis=0)])
+    a, b, c = at_corners(sheet.vertices, sheet.faces)
+    normal = np.stack([_totals(x, sides, len(vertices)) for x in cross(b - a, c - a)])
+    normal *= 0.5 * HAIR * cell / np.maximum(lengths(normal), np.finfo(float).tiny)  # at borders both sides cancel
+    return _joined(vertices + normal.T, sides, sheet.pairs)
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """How the sides of a sheet's faces are joined, the fronts before the backs.
+
+    vertex : (2,f,3) int32, the vertices of a closed mesh at their corners, one for each fan of sides that edges join
+    middle : (2,f,3) int32, for the edges from these corners to the next ones the further vertices in their middle, the
+             same for both sides that are joined there; -1 where there is none
+    halved : (2,m) int32, the vertices of the sheet that these middles are between
+    """
+
+    vertex: np.ndarray
+    middle: np.ndarray
+    halved: np.ndarray
+
+
+def _sides(sheet):
+    """Around each edge its faces are in order of their angles, and the side of each that faces ahead is joined to the
+    side of the next one that faces back; of a face alone, both its sides. So the sides around a vertex follow each
+    other in cycles: from low end to low end one way, from high end to high end the other."""
+    corner, corners = sheet.faces.reshape(-1), sheet.faces.size
+    edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
+    order, several = order_around(sheet, edge, count), np.repeat(count, count)
+    edge = edge.reshape(-1)
+    here, after = np.arange(corners), corner_after(np.arange(corners))
+    upwards = corner < corner[after]
+    ends = np.stack([np.where(upwards, here, after), np.where(upwards, after, here)])
+    following, last = np.roll(order, -1), np.cumsum(count) - 1
+    following[last] = order[last - count + 1]
+    ahead, back = corners * ~upwards[order], corners * upwards[following]
+    one, other = ends[:, order] + ahead, ends[:, following] + back
+    around = np.empty(2 * corners, sheet.faces.dtype)
+    around[one[0]], around[other[1]] = other[0], one[1]
+    n, vertex = _cycles(around)
+    met = vertex[:corners] == vertex[corners:]
+    row = np.flatnonzero((several > 2) | ((several == 2) & (met & met[after])[order]))
+    row = row[_alike(edge[order[row]], *vertex[one[:, row]])]
+    middle = np.full(2 * corners, -1, sheet.faces.dtype)
+    middle[order[row] + ahead[row]] = middle[following[row] + back[row]] = n + np.arange(len(row))
+    shape = 2, *sheet.faces.shape
+    return _Sides(vertex.reshape(shape), middle.reshape(shape), corner[ends[:, order[row]]])
+
+
+def _cycles(after):
+    """How many cycles a permutation (m,) has, and the number of that of each element, (m,), in order of the first ones:
+    these are found over 2, 4, 8 ... elements ahead."""
+    each = np.arange(len(after), dtype=after.dtype)
+    first, least = each, np.minimum(each, after)
+    while (least != first).any():
+        first, after = least, after.take(after)
+        least = np.minimum(first, first.take(after))
+    number = np.cumsum(first == each, dtype=after.dtype) - 1
+    return int(number[-1]) + 1 if len(number) else 0, number.take(first)
+
+
+def _alike(*keys):
+    """Which of some rows, by their `keys` (m,) each, there are more than one of, (m,) bool."""
+    order = np.lexsort(keys)
+    same = np.all([np.diff(key[order]) == 0 for key in keys], axis=0)
+    found = np.zeros(len(order), bool)
+    found[order[1:][same]] = found[order[:-1][same]] = True
+    return found
+
+
+def _totals(x, sides, n):
+    """Sums of x (f,) over the sides that each of n vertices has, less over the backs, (n,)."""
+    x = np.repeat(x, 3)
+    front, back = (np.bincount(of.reshape(-1), x, n) for of in sides.vertex)
+    cut = [np.flatnonzero(of.reshape(-1) >= 0) for of in sides.middle]
+    ahead, behind = (np.bincount(of.reshape(-1)[at], x[at], n) for of, at in zip(sides.middle, cut, strict=True))
+    return (front - back) + (ahead - behind)
+
+
+def _joined(vertices, sides, pairs):
+    """The closed mesh of the sides of faces the first of which are halves of so many `pairs`."""
+    halves = np.arange(sides.vertex.shape[1])
+    halves[: 2 * pairs] = np.roll(halves[: 2 * pairs], pairs)
+    cuts = [pairs, 2 * pairs]
+
+    def both(front, back):
+        parts = zip(np.split(front, cuts), np.split(back[halves], cuts), strict=True)
+        return np.concatenate([part for both in parts for part in both])
+
+    faces = both(sides.vertex[0], sides.vertex[1][:, [0, 2, 1]])
+    return _halved(Mesh(vertices, faces, 2 * pairs), both(sides.middle[0], sides.middle[1][:, ::-1]))
+
+
+def _halved(mesh, middle):
+    """The mesh with the edges of faces halved that have a vertex in the `middle`, (f,3), from each corner to the next;
+    -1 where there is none."""
+    cut = (middle >= 0).any(axis=1)
+    rest, faces, middle = mesh.of_faces(~cut), mesh.faces[cut], middle[cut]
+    for _ in range(3):
+        cut = (middle >= 0).any(axis=1)
+        turn = ((middle >= 0).argmax(axis=1)[:, None] + np.arange(3)) % 3
+        (a, b, c), (m, next_, last) = (np.take_along_axis(x, turn, axis=1)[cut].T for x in (faces, middle))
+        none = np.full_like(m, -1)
+        faces = np.concatenate([faces[~cut], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)])
+        middle = np.concatenate([middle[~cut], np.stack([none, none, last], 1), np.stack([none, next_, none], 1)])
+    return replace(rest, faces=np.concatenate([rest.faces, faces]))
+
+
+def _turned(sheet):
+    """The sheet with the diagonal of each quad turned that leads from border to border where the other one does not,
+    and is no edge."""
+    ends, count = edges_of(sheet.faces, len(sheet.vertices))
+    on_border = np.zeros(len(sheet.vertices), bool)
+    on_border[np.stack(ends)[:, count == 1]] = True
+    quads = sheet.quads
+    row = np.flatnonzero(on_border[quads[:, ::2]].all(axis=1) & ~on_border[quads[:, 1::2]].all(axis=1))
+    if not len(row):
+        return sheet
+    (a, b, c, d), table = quads[row].T, edge_table(sheet.faces, len(sheet.vertices))
+    row = row[(looked_up(table, a, c) == 2) & (looked_up(table, b, d) == 0)]
+    faces = sheet.faces.copy()
+    faces[row], faces[sheet.pairs + row] = quads[row][:, [1, 2, 3]], quads[row][:, [1, 3, 0]]
+    return replace(sheet, faces=faces)

@@ -1,0 +1,150 @@
+"""Where several sheets meet, cross, or run close to each other.
+
+A crease or a tight bend looks like two sheets to a few samples, too. Two samples lie on different sheets where neither
+is on the other's tangent plane, where no sample between them lies on one sheet with both, and where their
+sheets either run side by side or one goes on past the other's plane; where many pairs of a neighbourhood do.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ...field.local_surface import LocalSurface
+from ...field.projection import MEMBER, TRUSTED, membership
+from ...linalg import dots, row_dots
+from ...lookup import numbered
+from ...parallel import even_chunks, in_order, over_rows
+from ...progress import Progress
+
+NEIGHBOURS = 32
+_LINKED = 0.8  # least confidence of samples that link others
+_SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
+_WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least membership of them
+_PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
+_CHUNK = 8192  # samples
+_SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
+_WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
+_BESIDE = 0.05  # of the samples at meetings, more beside another sheet are no chance
+
+
+@dataclass(frozen=True)
+class Meetings:
+    """Samples in whose neighbourhood there are several sheets.
+
+    at      : (n,) bool
+    through : float, as a share of those, the samples of sheets that pass through one another
+    beside  : float, as a share of those, the ones of them with another sheet that runs side by side with theirs
+    """
+
+    at: np.ndarray
+    through: float
+    beside: float
+
+    @property
+    def share(self) -> float:
+        """Of all samples."""
+        return float(self.at.mean())
+
+    @property
+    def side_by_side(self) -> bool:
+        """Whether sheets run so close beside each other that single layers are torn there."""
+        return self.beside > _BESIDE
+
+
+def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
+    """Where sheets meet, cross or run close, from the samples alone."""
+    progress, n = Progress.of(progress), len(surface.points)
+    nearest, member = _members(surface, np.arange(n), NEIGHBOURS + 1, progress)
+    alike = member > MEMBER
+    trusted = surface.confidence >= TRUSTED
+    unlike = ~alike & trusted[nearest] & trusted[:, None]
+    i, at = np.nonzero(unlike)
+    j = nearest[i, at]
+    if not len(i):
+        return Meetings(np.zeros(n, bool), 0.0, 0.0)
+    apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
+    cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
+    askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
+    past = _goes_past(i[askew], j[askew], surface)
+    apart[askew] = past > 0
+    pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
+    at = _grown(*((found >= _LEAST) & (found >= share * pairs) for share in (_SHARE, _WEAK)), nearest)
+    through = _among(n, i[askew][past == 2], j[askew][past == 2])
+    side_by_side = apart & (cosine > _SIDE_BY_SIDE)
+    beside = at & _among(n, i[side_by_side], j[side_by_side])
+    return Meetings(at, *(float(some.sum() / max(at.sum(), 1)) for some in (through, beside)))
+
+
+def _among(n, *rows):
+    """Which of n samples are among some rows, (n,) bool."""
+    found = np.zeros(n, bool)
+    found[np.concatenate(rows)] = True
+    return found
+
+
+def _grown(sure, weak, nearest):
+    """The samples marked as `weak` (n,) bool that others connect to `sure` ones, as weak edges of an image (Canny, IEEE
+    PAMI 8(6), 1986), (n,) bool; `nearest` (n,k) tells which lie next to each other."""
+    n, of = len(nearest), np.flatnonzero(weak)
+    beside = nearest[of, : 1 + _NEXT]
+    row, column = np.nonzero(weak[beside])
+    graph = coo_matrix((np.ones(len(row), bool), (of[row], beside[row, column])), shape=(n, n))
+    part = connected_components(graph, directed=False)[1]
+    return weak & np.isin(part, part[sure])
+
+
+def _linked(i, j, nearest, alike, sure):
+    """Whether samples i and j, (m,) each, have a sure sample between them that is an alike neighbour of both."""
+    n, kept = len(nearest), alike & sure[:, None] & sure[nearest]
+    first = np.append(0, np.cumsum(kept.sum(axis=1)))
+    links = csr_matrix((np.ones(first[-1], np.int8), nearest[kept], first), shape=(n, n))
+    links, found = links + links.T, np.empty(len(i), bool)
+
+    def look(part):
+        found[part] = np.asarray(links[i[part]].multiply(links[j[part]]).sum(axis=1)).reshape(-1) > 0
+
+    over_rows(look, len(i), _CHUNK)
+    return found
+
+
+def _goes_past(i, j, surface):
+    """Of how many of two samples, 0 to 2, the sheet has samples well on both sides of the other's tangent plane."""
+    n = len(surface.points)
+    pair, number = numbered(np.minimum(i, j) * n + np.maximum(i, j))
+    ends, past = np.stack(np.divmod(pair, n)), np.zeros(len(pair), np.int8)
+    every, row = numbered(ends)
+    wide, member = _members(surface, every, _WIDER, Progress())
+    member = (member > _STRAIGHT) & (surface.confidence[wide] >= _LINKED)
+    points, normals = surface.columns.points, surface.normals.T
+
+    def look(part):
+        for one, other in ((0, 1), (1, 0)):
+            at, on = row[one, part], ends[other, part]
+            near, known = wide[at], member[at]
+            away = [x.take(near) - x.take(on)[:, None] for x in points]
+            height = dots(away, [axis.take(on)[:, None] for axis in normals])
+            limit = _PAST * surface.spacing[ends[one, part]]
+            above = np.where(known, height, -np.inf).max(axis=1) > limit
+            past[part] += above & (np.where(known, height, np.inf).min(axis=1) < -limit)
+
+    over_rows(look, len(pair), _CHUNK)
+    return past[number]
+
+
+def _members(surface, own, k, progress):
+    """The k samples nearest to the samples `own` (m,), and how surely each lies on one sheet with them, (m,k)."""
+    k = min(k, len(surface.points))
+    nearest, member = np.empty((len(own), k), np.int64), np.empty((len(own), k), np.float32)
+
+    def look(part):
+        near = surface.tree.query(surface.points[own[part]], k=k)[1]
+        points, normals = surface.columns.points, surface.normals.T
+        between = np.stack([x.take(near) - x.take(own[part])[:, None] for x in points])
+        own_normals, theirs = normals[:, own[part], None], np.stack([column.take(near) for column in normals])
+        return near, membership(between, dots(between, own_normals), dots(between, theirs))
+
+    for part, found in in_order(look, even_chunks(len(own), _CHUNK, progress)):
+        nearest[part], member[part] = found
+    return nearest, member

@@ -1,0 +1,42 @@
+"""How far a mesh is from the samples, and how much of it is turned away from them."""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...linalg import cross, dots, lengths
+from ..mesh import Mesh, at_corners
+
+_FACES = 4  # that a sample may belong to
+_ASKED = 4096  # samples or faces, evenly picked out of more
+_TURNED = np.cos(np.pi / 4)
+
+
+def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """Distances of the samples (n,3), or of 4096 and more of them, to the mesh, in their units, (k,) float64; infinite
+    to one without faces.
+
+    Measured to discs around the centroids of the nearest faces, as large as these: a little less than to the triangles.
+    """
+    if not len(mesh.faces):
+        return np.full(1, np.inf)
+    corners = np.stack(at_corners(mesh.vertices, mesh.faces))
+    centre, normal = corners.mean(axis=0), cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
+    points = points[:: max(len(points) // _ASKED, 1)]
+    tree = KDTree(centre.T, balanced_tree=False, compact_nodes=False)
+    row = tree.query(points, k=range(1, 1 + min(_FACES, len(mesh.faces))), workers=-1)[1]
+    off = points.T[:, :, None] - centre[:, row]
+    height = dots(off, normal[:, row])
+    lateral = np.sqrt(np.maximum(dots(off, off) - height**2, 0)) - radius[row]
+    return np.hypot(height, np.maximum(lateral, 0)).min(axis=1)
+
+
+def askew(mesh: Mesh, tree: KDTree, normals: np.ndarray) -> float:
+    """Share of the area of the mesh, of 4096 and more of its faces, that is turned by more than 45 degrees from the
+    normal of the nearest sample, of those in the `tree` with `normals` (n,3); 1 for a mesh without faces."""
+    corners = np.stack(at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)]))
+    normal = cross(corners[1] - corners[0], corners[2] - corners[0])
+    area, nearest = lengths(normal), tree.query(corners.mean(axis=0).T, workers=-1)[1]
+    total = area.sum()
+    return float(area[np.abs(dots(normal, normals[nearest].T)) < _TURNED * area].sum() / total) if total else 1.0

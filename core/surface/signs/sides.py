@@ -1,0 +1,277 @@
+"""Which nodes of the grid lie inside a closed shape.
+
+The paper's appendix orients the samples, by spreading an outside label from the box through the Voronoi vertices. Here
+the label spreads over the grid, where each node decides with all its neighbours: Voronoi vertices close to the surface
+(slivers, creases, noise) take either side, and one that errs misleads every sample after it.
+
+Nodes far from the surface fall into regions, of which the one at the box is outside. Between them, the side s of each
+node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the surface and of (s_a + s_b)^2 over those
+that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Farther than two cells from the
+surface, where it crosses no edge, the nodes of a group of 2^3 share their side. Nested shells so get alternating sides:
+a hollow ball is inside between its walls, and outside within. Where the outside lies on both sides of most samples, as
+around an open sheet, no side need be asked: nothing is inside.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import LinearOperator, cg
+from scipy.spatial import KDTree
+
+from ...field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
+from ...field.grid import Grid, node_strides
+from ...field.local_surface import LocalSurface
+from ...linalg import symmetric
+from ...lookup import is_among, numbered
+from ...progress import Progress
+from ..edges.crossings import Crossings
+
+_NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
+_BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
+_OFF = 0.7  # cells beyond the distance where regions start, at which samples look for them
+_ALONE = 2.0  # cells from the surface, where no edge is crossed any more: nodes farther off share their sides
+_OUTSIDE = 0.5  # share of the samples with the outside on both sides, above which nothing is inside
+_SPECK = 27  # nodes
+_TOLERANCE, _STEPS = 1e-3, 1000
+_ADJACENT = 1.8  # cells, edges of one patch
+_OPEN = 0.05  # share of crossings, or of samples, with one side at both ends that a closed shape may have
+_PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening that does not count
+
+
+@dataclass(frozen=True)
+class Sides:
+    """The inside, and the crossings that contradict it.
+
+    inside    : (nx,ny,nz) bool, or Blocks of it
+    alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
+                an open surface
+    within    : (w,) bool, whether that side is the inside
+    gaps      : (g,3) float64, middles of edges where the sides differ and no crossing is: openings
+    crossings : int, number of crossed edges     grid : Grid of the nodes
+    """
+
+    inside: np.ndarray | Blocks
+    alike: np.ndarray
+    within: np.ndarray
+    gaps: np.ndarray
+    crossings: int
+    grid: Grid
+
+    @property
+    def share(self) -> float:
+        """Share of the crossings that have one side at both ends."""
+        return len(self.alike) / max(self.crossings, 1)
+
+    @property
+    def spanned(self) -> float:
+        """Number of edges that span openings, relative to all crossings."""
+        return len(self.gaps) / max(self.crossings, 1)
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest connected patch of either, relative to all crossings."""
+        most = max(np.bincount(patches(middle, self.grid)).max(initial=0) for middle in (self.alike, self.gaps))
+        return most / max(self.crossings, 1)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the surface bounds the inside, but for small parts."""
+        return self.share <= _OPEN
+
+    @property
+    def complete(self) -> bool:
+        """Whether what bounds the inside is the surface and nothing else, but for specks."""
+        return self.closed and self.largest <= _PATCH
+
+    def sign(self, values: np.ndarray | Blocks) -> np.ndarray | Blocks:
+        """Distances (nx,ny,nz) with their signs: negative inside."""
+        return each(lambda inside, u: np.where(inside, -u, u), self.inside, values)
+
+
+def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Sides:
+    """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32, or Blocks of a band wider than
+    :func:`needed_band`, and the crossed grid edges.
+
+    Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges. Of a surface with the
+    outside on both sides of most samples every crossing has one side at both ends.
+    """
+    progress = Progress.of(progress)
+    near, labels, count = _far_regions(values, surface, grid)
+    outside = _outside(labels)
+    if _is_open(labels, surface, grid):
+        low, axis = np.divmod(crossings.changing_sides, 3)
+        edges = [_Edges(low[axis == a], a, np.ones((axis == a).sum(), bool), grid) for a in range(3)]
+        return _judged(each(np.zeros_like, near), edges)
+    node = marked_nodes(near)
+    number, n = _numbered(node, at_nodes(values, node) <= _ALONE * grid.spacing, grid)
+    cluster = each(lambda label: label.astype(np.int32) - 1, labels)
+    put(cluster, node, count + number)
+    progress(0.1)
+    edges = [_edges_along(axis, node, near, crossings, grid) for axis in range(3)]
+    progress(0.2)
+    joined = ((at_nodes(cluster, along.low), at_nodes(cluster, along.high), along.crossed) for along in edges)
+    side = _sides(joined, count + n, outside - 1, progress) < 0
+    progress(0.7)
+    inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster))
+    progress(0.9)
+    return _judged(inside, edges)
+
+
+def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
+    """Whether the sides of :func:`find_sides`, from the same distances, may be closed: not where many of the samples
+    that have regions on both sides have one region there. On shapes that are closed it is less than 1 % of them."""
+    one, other = _seen(_far_regions(values, surface, grid)[1], surface, grid).T
+    both = (one > 0) & (other > 0)
+    return (both & (one == other)).sum() <= _OPEN * both.sum()
+
+
+def _far_regions(values, surface, grid):
+    """Which nodes are near the surface and off the sides of the box, the regions of the others, and their number."""
+    limit = np.float32(_far(surface, grid) * grid.spacing)
+    near = each(lambda u, inner: inner & (u <= limit), values, inner_nodes(values))
+    return near, *regions(each(np.logical_not, near))
+
+
+def _outside(labels):
+    """The region at the box."""
+    return int(at_nodes(labels, np.array([0]))[0])
+
+
+def _is_open(labels, surface, grid):
+    return (_seen(labels, surface, grid) == _outside(labels)).all(axis=1).mean() > _OUTSIDE
+
+
+def _seen(labels, surface, grid):
+    """The regions of :func:`_far_regions` on either side of each sample, (n,2); 0 where there is none."""
+    return regions_beside(labels, surface, _far(surface, grid) * grid.spacing, grid)
+
+
+def regions_beside(labels, surface: LocalSurface, level: float, grid: Grid) -> np.ndarray:
+    """The regions on either side of each sample, (n,2) int64, from the `labels` (nx,ny,nz) or Blocks of the nodes that
+    are farther than a `level` from the surface; 0 where there is none."""
+    points, normals = surface.points, surface.normals
+    beside = np.zeros((len(points), 2), np.int64)
+    for side, sign in enumerate((-1, 1)):
+        cells = (points + sign * (level + _OFF * grid.spacing) * normals - grid.origin) / grid.spacing
+        cells = np.rint(cells).astype(np.int64)
+        inside = np.flatnonzero(((cells >= 0) & (cells < grid.shape)).all(axis=1))
+        beside[inside, side] = at_nodes(labels, np.ravel_multi_index(cells[inside].T, grid.shape))
+    return beside
+
+
+def needed_band(surface: LocalSurface, grid: Grid) -> float:
+    """Cells from the surface up to which :func:`find_sides` needs distances."""
+    return _far(surface, grid) + _BESIDE
+
+
+def _far(surface, grid):
+    """Cells from the surface where regions start."""
+    far = 0.5 * surface.bridge * surface.spacing_in_cells(grid)
+    return float(np.clip(far, _NEAREST, _FARTHEST))
+
+
+@dataclass(frozen=True)
+class _Edges:
+    """Grid edges along one axis.
+
+    low : (e,) int64, flat indices of their lower ends     crossed : (e,) bool, whether the surface crosses them
+    """
+
+    low: np.ndarray
+    axis: int
+    crossed: np.ndarray
+    grid: Grid
+
+    @property
+    def high(self) -> np.ndarray:
+        """(e,) int64, flat indices of the upper ends."""
+        return self.low + node_strides(self.grid.shape)[self.axis]
+
+    def middles(self, chosen: np.ndarray) -> np.ndarray:
+        """Positions of the middles of those marked in `chosen` (e,), (m,3)."""
+        return self.grid.positions(self.low[chosen]) + 0.5 * self.grid.spacing * np.eye(3)[self.axis]
+
+
+def _edges_along(axis, node, near, crossings, grid):
+    """The edges along an axis with an end among the nodes, those marked in `near`, none of which lies on the side of
+    the box."""
+    below = node - node_strides(grid.shape)[axis]
+    low = np.concatenate([node, below[~at_nodes(near, below)]])
+    changing, along = np.divmod(crossings.changing_sides, 3)
+    return _Edges(low, axis, is_among(low, changing[along == axis]), grid)
+
+
+def _judged(inside, edges):
+    """The sides, with the edges that contradict them, from those along each axis."""
+    same, within, gaps = [], [], []
+    for along in edges:
+        low = at_nodes(inside, along.low)
+        differ = low != at_nodes(inside, along.high)
+        alike = along.crossed & ~differ
+        same.append(along.middles(alike))
+        within.append(low[alike])
+        gaps.append(along.middles(~along.crossed & differ))
+    crossed = sum(int(along.crossed.sum()) for along in edges)
+    return Sides(inside, *(np.concatenate(parts) for parts in (same, within, gaps)), crossed, edges[0].grid)
+
+
+def _numbered(node, alone, grid):
+    """Which unknown each node is, (b,) int64, and how many there are: one for each of the nodes marked in `alone` and
+    for each group of 2^3 of the others."""
+    at = np.stack(np.unravel_index(node[~alone], grid.shape)) // 2
+    group, row = numbered(np.ravel_multi_index(tuple(at), grid.shape))
+    number, n = np.empty(len(node), np.int64), int(alone.sum())
+    number[alone] = np.arange(n)
+    number[~alone] = n + row
+    return number, n + len(group)
+
+
+def _sides(edges: Iterable, n, outside, progress):
+    """The side of each of n clusters in [-1,1], from edges between them, parts of (a, b, crossed), (e,) each; cluster
+    `outside` is 1."""
+    links, push, degree = csr_matrix((n, n)), np.zeros(n), np.zeros(n)
+    for a, b, crossed in edges:
+        kept = a != b
+        a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
+        degree += np.bincount(a, minlength=n) + np.bincount(b, minlength=n)
+        free = (a != outside) & (b != outside)
+        links += symmetric(weight[free], a[free], b[free], n)
+        push += np.bincount((a + b - outside)[~free], weight[~free], n)
+    progress(0.3)
+    laplacian = LinearOperator((n, n), lambda x: degree * x - links @ x, dtype=float)
+    scales = diags(1 / np.maximum(degree, 1.0))
+    looks = progress.part(0.4, 0.7).each(range(_STEPS))
+    side, _ = cg(laplacian, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
+    side[outside] = 1
+    return side
+
+
+def _without_specks(inside):
+    """With connected sets of less than _SPECK nodes on one side turned over."""
+    for side in (True, False):
+        part, _ = regions(each(lambda here: here == side, inside))  # noqa: B023  called at once
+        small = counts(part) < _SPECK
+        small[0] = False
+        inside = each(lambda here, name: here ^ small[name], inside, part)  # noqa: B023
+    return inside
+
+
+def patches(middle: np.ndarray, grid: Grid, reach: float = _ADJACENT) -> np.ndarray:
+    """Number of the patch of each edge of the grid, (m,), by their middles (m,3), or of other places: those of one
+    patch are next to each other, within `reach` cells."""
+    if not len(middle):
+        return np.empty(0, np.int64)
+    pairs = KDTree(middle).query_pairs(reach * grid.spacing, output_type="ndarray")
+    return connected_components(symmetric(np.ones(len(pairs), bool), *pairs.T, len(middle)), directed=False)[1]
+
+
+def patch_lengths(patch: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Diagonals of the boxes around the places (m,3) of each patch, which have its number, (m,); one for each patch."""
+    order = np.argsort(patch, kind="stable")
+    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
+    extent = np.maximum.reduceat(place[order], first) - np.minimum.reduceat(place[order], first)
+    return np.linalg.norm(extent, axis=1)

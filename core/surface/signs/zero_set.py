@@ -1,0 +1,65 @@
+"""Where signed distances are zero, as vertices and faces, and creases of meshes that lie there."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...field.blocks import Blocks, at_nodes
+from ...field.grid import Grid
+from ...field.local_surface import LocalSurface
+from ...linalg import row_dots
+from ...progress import Progress
+from ..double.corners import into_corners
+from ..mesh import Mesh, in_use
+from ..meshing.evening import FLAT, vertex_normals
+from ..meshing.isosurface import isosurface
+from .thin_parts import ThinParts
+
+_ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
+_INTO = 1.5  # cells, how far a vertex may go into a crease
+
+
+def zero_set(
+    values: np.ndarray | Blocks,
+    thin: ThinParts | None,
+    surface: LocalSurface,
+    grid: Grid,
+    progress: Progress,
+    within: float = np.inf,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v,3) and quads or triangles (f,4) or (f,3) of the zero set of signed distances (nx,ny,nz) float32 or
+    Blocks, which may be changed: at thin parts, which the signs of nodes do not show, they start off the surface and
+    are pulled in, as those of a double cover. Only where the nodes nearest to the vertices are `within` that distance:
+    where distances end, there is no surface."""
+    if thin:
+        thin.lower(values, grid)
+    cells, faces = isosurface(values, 0.0)
+    vertices = grid.origin + grid.spacing * cells
+    if np.isfinite(within):
+        near = np.abs(at_nodes(values, grid.nearest_nodes(vertices))) <= within
+        vertices, faces = in_use(vertices, faces[near[faces].all(axis=1)])
+    if thin:
+        lifted = np.flatnonzero(thin.lift(vertices))
+        vertices[lifted] -= surface.project(vertices[lifted], progress).step
+    return vertices, faces
+
+
+def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
+    """The mesh, whose vertices lie on the surface, with those next to creases taken into them: inward ones, then
+    outward ones, which are inward seen from inside."""
+    vertices = mesh.vertices
+    for turn, outward in enumerate((1.0, -1.0)):
+        part = progress.part(turn / 2, (turn + 1) / 2)
+        normal, least = vertex_normals(vertices, mesh.faces)
+        beside_bends, side = np.zeros(len(vertices), bool), np.zeros_like(vertices)
+        beside_bends[mesh.faces[(least < FLAT)[mesh.faces].any(axis=1)]] = True
+        row = np.flatnonzero(beside_bends)
+        way = outward * normal[row]
+        found = surface.project(vertices[row] + _ASIDE * cell * way, part.part(0.0, 0.5))
+        direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
+        clear = back & (row_dots(direction, way) > 0) & ~found.past_rim
+        side[row[clear]] = direction[clear]
+        known = side.any(axis=1)
+        beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
+        vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), _INTO)
+    return replace(mesh, vertices=vertices)

@@ -1,0 +1,77 @@
+"""The single layer of a surface without two sides: from its crossings of the grid's edges."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ...field.grid import Grid
+from ...field.local_surface import LocalSurface
+from ...lookup import numbered
+from ...progress import Progress
+from ..edges.crossings import Crossings
+from ..mesh import Mesh
+from ..meshing.evening import evened
+from ..meshing.pieces import pieces_with_samples
+from ..meshing.planes import to_planes
+from ..meshing.triangles import mesh_of
+from .settling import settled
+from .sharing import shared_vertices
+
+_TOUCH = 0.35  # cells
+_STIFFNESS = 0.05  # of vertices where sheets meet
+
+
+def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
+    """Dual contouring of the zero set (Ju et al., ACM TOG 21(3), 2002), by the edges its two sides are told apart on.
+
+    Every cell that the surface passes has one vertex, the mean of its crossings, evened and taken to its foot point,
+    but one for each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two.
+    Where sheets meet, vertices are put where the planes of their crossings meet, a cell away at most.
+    """
+    progress = Progress.of(progress)
+    quads, count, kind = shared_vertices(crossings, grid)
+    corner, place = quads.reshape(-1), np.repeat(crossings.place, 4, axis=0)
+    weight = np.bincount(corner, minlength=count)
+    vertices = np.stack([np.bincount(corner, place[:, a], count) for a in range(3)], axis=1) / weight[:, None]
+    meeting = kind > 0
+    step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[meeting]
+    length = np.linalg.norm(step, axis=1, keepdims=True)
+    vertices[meeting] += step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
+    free = kind < 2
+    vertices = evened(vertices, quads, meeting)
+    step = surface.project(vertices[free], progress.part(0.0, 0.7)).step
+    vertices[free] = settled(vertices[free], step, surface, grid.spacing, progress.part(0.7, 1.0))
+    mesh = _without_touches(_without_repeats(mesh_of(vertices, quads)), grid.spacing)
+    return pieces_with_samples(mesh, surface.tree, grid.spacing)
+
+
+def _without_touches(mesh, cell):
+    """The mesh with the ends of short edges of more than two faces made one vertex each.
+
+    A sheet that is nearly level with a face of the grid may cross all four of its edges; four quads then touch along
+    an edge between two cells whose vertices almost coincide.
+    """
+    edges, counts = mesh.edge_counts()
+    edges = edges[counts > 2]
+    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    edges = edges[length <= _TOUCH * cell]
+    if not len(edges):
+        return mesh
+    graph = coo_matrix((np.ones(len(edges), bool), tuple(edges.T)), shape=(len(mesh.vertices),) * 2)
+    vertex = connected_components(graph, directed=False)[1]
+    share = np.bincount(vertex)
+    vertices = np.stack([np.bincount(vertex, x) / share for x in mesh.vertices.T], axis=1)
+    return _without_repeats(replace(mesh, vertices=vertices, faces=vertex[mesh.faces].astype(np.int32)))
+
+
+def _without_repeats(mesh):
+    """The mesh without faces that pass a vertex twice or that it has already."""
+    low, middle, high = np.sort(mesh.faces.astype(np.int64), axis=1).T
+    proper = np.flatnonzero((low < middle) & (middle < high))
+    edge = numbered(low[proper] * len(mesh.vertices) + middle[proper])[1]
+    _, first = np.unique(edge * len(mesh.vertices) + high[proper], return_index=True)
+    kept = np.zeros(len(low), bool)
+    kept[proper[first]] = True
+    return mesh.of_faces(kept)

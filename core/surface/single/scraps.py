@@ -1,0 +1,108 @@
+"""Scraps along the lines where sheets meet: a few faces between edges of three faces or more that show nothing.
+
+A spur is a small patch that ends in a border right past the line. A pocket is closed by patches that are all small:
+two quads with one rim, for instance.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ...field.local_surface import LocalSurface
+from ...linalg import row_dots
+from ..mesh import Mesh, edge_numbers
+
+_SMALL = 32  # faces of a patch
+_PAST = 1.5  # cells, that a spur goes past the line
+_SIZE = 0.1  # of a patch's own extent, counted beside its distance from the surface
+_ROUNDS = 4
+
+
+def without_scraps(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
+    """The mesh without spurs, and with one patch less in each pocket: of those that close it, the one farthest from the
+    surface. Patches are connected across edges of two faces. No border is made where there was none."""
+    edge, counts = edge_numbers(mesh.faces, len(mesh.vertices))
+    if (counts <= 2).all():
+        return mesh
+    label = _patches(edge, counts)
+    face = np.flatnonzero(np.bincount(label)[label] <= _SMALL)
+    kept = np.ones(len(mesh.faces), bool)
+    for _ in range(_ROUNDS):
+        label = _patches(edge[face], counts)
+        shared = counts[edge[face]] == 2
+        shared &= np.bincount(edge[face].reshape(-1), minlength=len(counts))[edge[face]] == 1  # with a larger patch
+        alone = (np.bincount(label, shared.any(axis=1)) == 0)[label]
+        face, label = face[alone], np.unique(label[alone], return_inverse=True)[1]
+        dropped = _scraps(mesh, face, label, edge, counts, surface, cell)
+        if not dropped.any():
+            break
+        kept[face[dropped]] = False
+        np.subtract.at(counts, edge[face[dropped]], 1)
+        face = face[~dropped]
+    if kept.all():
+        return mesh
+    return mesh.part(kept)
+
+
+def _patches(edge, counts):
+    """Number of each face's patch, (f,), by its edges (f,3)."""
+    two = counts[edge] == 2
+    owner, number = np.nonzero(two)[0], edge[two]
+    order = np.argsort(number, kind="stable")
+    owner, number = owner[order], number[order]
+    pair = np.flatnonzero(number[1:] == number[:-1])
+    graph = coo_matrix((np.ones(len(pair), bool), (owner[pair], owner[pair + 1])), shape=(len(edge),) * 2)
+    return connected_components(graph, directed=False)[1]
+
+
+def _scraps(mesh, face, label, edge, counts, surface, cell):
+    """Which of some faces (m,), in patches `label` (m,), go."""
+    corners = mesh.vertices[mesh.faces[face]]
+    rim = counts[edge[face]] != 2
+    open_patch = np.bincount(label, (counts[edge[face]] == 1).any(axis=1)) > 0
+    order = np.argsort(label, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(order) else []
+    off = surface.project(corners.mean(axis=1)).distance
+    cost = np.array([off[p].max() + _SIZE * np.linalg.norm(np.ptp(corners[p].reshape(-1, 3), axis=0)) for p in parts])
+    dropped, left = np.zeros(len(face), bool), counts.copy()
+
+    def drop(part):
+        sides = edge[face[part]][rim[part]]
+        number, times = np.unique(sides, return_counts=True)
+        if ((left[number] - times == 1) & (left[number] > 1)).any():
+            return
+        left[number] -= times
+        dropped[part] = True
+
+    for patch in np.flatnonzero(open_patch):
+        if _is_spur(mesh, face[parts[patch]], edge, counts, cell):
+            drop(parts[patch])
+    basis, bit = {}, {number: k for k, number in enumerate(np.unique(edge[face][rim]).tolist())}
+    for patch in np.argsort(cost, kind="stable"):
+        part = parts[patch]
+        if open_patch[patch]:
+            continue
+        row = 0
+        for number in edge[face[part]][rim[part]].tolist():
+            row ^= 1 << bit[number]
+        while row and row.bit_length() in basis:
+            row ^= basis[row.bit_length()]
+        if row:
+            basis[row.bit_length()] = row
+        else:
+            drop(part)
+    return dropped
+
+
+def _is_spur(mesh, face, edge, counts, cell):
+    """Whether all vertices of a patch with a border lie within 1.5 cells of a line that it ends at."""
+    tail, head = mesh.faces[face], np.roll(mesh.faces[face], -1, axis=1)
+    line = counts[edge[face]] > 2
+    if not line.any():
+        return False
+    start, stop = mesh.vertices[tail[line]], mesh.vertices[head[line]]
+    x = mesh.vertices[np.unique(tail)]
+    along = stop - start
+    share = row_dots(x[:, None] - start, along) / np.maximum((along**2).sum(axis=1), 1e-300)
+    foot = start + np.clip(share, 0, 1)[..., None] * along
+    return (np.linalg.norm(x[:, None] - foot, axis=2).min(axis=1) <= _PAST * cell).all()

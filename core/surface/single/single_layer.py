@@ -1,0 +1,147 @@
+"""The single layer: one sheet, open where the surface is open, non-manifold where sheets meet."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...field.grid import Grid
+from ...field.local_surface import LocalSurface
+from ...field.steps import NearBand
+from ...progress import Progress
+from ...settings import Settings
+from ..double.double_cover import double_cover
+from ..edges.crossings import Crossings
+from ..mesh import Mesh
+from ..meshing.centring import centred
+from ..signed import signed_mesh
+from ..signs.sides import Sides, patch_lengths, patches
+from ..signs.two_sides import LONG, two_sided
+from ..signs.zero_set import sharpened
+from .dual_contour import dual_contour
+from .holes import fill_pinholes
+from .junctions import onto_junctions
+from .one_side import one_side
+from .open_sheet import open_sheet
+from .orientation import orient
+from .rims import at_rims, smooth_rims
+from .scraps import without_scraps
+
+_MENDED = 2  # times, since holes may show where scraps are gone
+_BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
+_BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
+
+
+def single_layer(
+    values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
+) -> tuple[Mesh, int]:
+    """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
+    progress = Progress.of(progress)
+    sheet = sheet_of_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.5))
+    if sheet is not None:
+        return sheet, 0
+    cover = partial(double_cover, values, band, surface, grid, Settings().offset)
+    return sheet_of_crossings(values, band, crossings, surface, grid, cover, progress.part(0.5, 1.0))
+
+
+def sheet_of_sides(
+    values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
+) -> Mesh | None:
+    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface;
+    else what lies between the two sides (see :func:`open_sheet`). None where it is one-sided or sheets meet.
+
+    values : (nx,ny,nz) float32 or Blocks, unsigned distances     band : the nodes near the surface
+    """
+    progress = Progress.of(progress)
+    if sides.complete:
+        return signed_mesh(sides.sign(values), surface, grid, progress)
+    if crossings.normal.any():
+        return None
+    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.2))
+    if signed is None:
+        return None
+    found = open_sheet(signed, band, surface, grid, progress.part(0.2, 0.8))
+    sheet, unoriented = _finished(found, surface, grid, progress.part(0.8, 1.0))
+    return None if unoriented or (sheet.edge_counts()[1] > 2).any() else sheet
+
+
+def sheet_of_crossings(
+    values,
+    band: NearBand,
+    crossings: Crossings,
+    surface: LocalSurface,
+    grid: Grid,
+    cover: Callable[[], Mesh],
+    progress=None,
+) -> tuple[Mesh, int]:
+    """Any surface as one sheet by :func:`dual_contour`, with edges of several faces where sheets meet.
+
+    Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
+    either side, and may have handles there; so it is taken only if the dual contour, which shows the line, cannot be
+    wound alike wherever it has two faces, and does not end along the line, as where sheets meet. Where sheets run side
+    by side this may be torn, too; then it is one side of the `cover`, a function that gives the double cover (see
+    :func:`one_side`). Creases may look like sheets that meet for some cells; so what lies between two sides is taken in
+    place of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines and no
+    borders in their place.
+
+    Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
+    """
+    progress = Progress.of(progress)
+    found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
+    sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
+    if not crossings.normal.any():
+        return sheet, unoriented
+    lines = _lines(sheet)
+    chance = not (unoriented or crossings.side_by_side) and _are_short(lines, grid)
+    if not (unoriented or chance):
+        return sheet, unoriented
+    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
+    if signed is None:
+        return sheet, unoriented
+    if crossings.side_by_side:
+        return _finished(one_side(cover(), signed, surface, grid), surface, grid, Progress())
+    found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
+    found, left = _finished(found, surface, grid, progress.part(0.9, 1.0))
+    parted = _borders_beside(lines, found, grid.spacing)
+    replaces = not (left or parted or len(_lines(found))) if chance else parted <= _BORDERED * len(lines)
+    return (found, left) if replaces else (sheet, unoriented)
+
+
+def _lines(sheet):
+    """Both ends of the edges of more than two faces, (e,2,3)."""
+    edges, count = sheet.edge_counts()
+    return sheet.vertices[edges[count > 2]]
+
+
+def _are_short(lines, grid):
+    """Whether there are lines of edges (e,2,3), and all of them are short."""
+    if not len(lines):
+        return False
+    length = patch_lengths(np.repeat(patches(lines.mean(axis=1), grid), 2), lines.reshape(-1, 3))
+    return length.max() <= LONG * max(grid.shape) * grid.spacing
+
+
+def _borders_beside(lines, sheet, cell):
+    """How many edges of one face a sheet has beside the lines of edges (e,2,3) of another."""
+    edges, count = sheet.edge_counts()
+    border = sheet.vertices[edges[count == 1]].mean(axis=1)
+    return int((KDTree(lines.mean(axis=1)).query(border)[0] < _BESIDE * cell).sum())
+
+
+def _finished(mesh, surface, grid, progress):
+    """A sheet mended, wound alike, and sharp where sheets meet or fold, and the number of edges across which it is not
+    wound alike."""
+    sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
+    sheet = onto_junctions(sheet, surface, grid.spacing, progress.part(0.0, 0.5))
+    return centred(sharpened(sheet, surface, grid.spacing, progress.part(0.5, 1.0))), unoriented
+
+
+def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
+    """A sheet with its pinholes closed, scraps taken off, and its borders smoothed."""
+    for _ in range(_MENDED):
+        filled = fill_pinholes(mesh, surface, cell)
+        mesh = without_scraps(filled, surface, cell)
+        if mesh is filled:
+            break
+    return smooth_rims(mesh, surface, cell, at_rims(mesh, surface, cell))

@@ -1,0 +1,340 @@
+"""Both sides of a sheet as one closed mesh."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from core import Mesh, Settings, both_sides, reconstruct
+from core.surface import extract
+from core.surface.double.layers import HAIR
+from tests import shapes
+
+CELL = 0.1
+
+
+def strip(rows, columns):
+    """A flat grid of quads, as pairs of triangles."""
+    x, y = np.meshgrid(np.arange(rows + 1), np.arange(columns + 1), indexing="ij")
+    vertices = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3).astype(float)
+    at = np.arange(len(vertices)).reshape(rows + 1, columns + 1)
+    a, b, c, d = (part.reshape(-1) for part in (at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh(vertices, faces.astype(np.int32), rows * columns)
+
+
+def is_closed_manifold(mesh):
+    """Two faces at each edge, one each way, and one fan of faces around each vertex, all of them in use."""
+    directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    fans = 0
+    for vertex in range(len(mesh.vertices)):
+        around = np.stack([np.roll(face, -list(face).index(vertex))[1:] for face in mesh.faces if vertex in face])
+        ends, number = np.unique(around, return_inverse=True)
+        graph = coo_matrix((np.ones(len(around)), tuple(number.reshape(-1, 2).T)), shape=(len(ends),) * 2)
+        fans += connected_components(graph)[0]
+    both_ways = len(np.unique(directed, axis=0)) == len(directed)
+    return both_ways and set(mesh.edge_counts()[1]) == {2} and fans == len(mesh.vertices)
+
+
+def touching():
+    """Two triangles with a vertex in common, wound alike."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0.0]])
+    return Mesh(vertices, np.array([[0, 1, 2], [0, 3, 4]], np.int32))
+
+
+def book(pages):
+    """Pages of three quads each with their backs on the z axis, at angles in degrees, wound alike or not."""
+    turn, z = np.radians(pages), np.arange(4.0)
+    away = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    back = np.column_stack([np.zeros((4, 2)), z])
+    edges = [np.column_stack([np.tile(way, (4, 1)), z]) for way in away]
+    quads = [[(k, k + 1, at + k + 1, at + k) for k in range(3)] for at in 4 * np.arange(1, 1 + len(pages))]
+    a, b, c, d = np.concatenate(quads).T
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    faces[::3] = faces[::3, ::-1]
+    return Mesh(np.concatenate([back, *edges]), faces.astype(np.int32))
+
+
+def in_halves():
+    """An octahedron with a wall through its middle."""
+    closed = octahedron()
+    return Mesh(closed.vertices, np.concatenate([closed.faces, [[0, 1, 3], [0, 3, 4]]]).astype(np.int32))
+
+
+def finned():
+    """A patch with a triangle upright on one edge within it."""
+    flat = strip(3, 3)
+    vertices = np.concatenate([flat.vertices, [[1.5, 1, 1]]])
+    return Mesh(vertices, np.concatenate([flat.faces, [[5, 9, 16]]]).astype(np.int32))
+
+
+def octahedron():
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    upper = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]]
+    return Mesh(corners, np.array([*upper, *([b, a, 5] for a, b, _ in upper)], np.int32))
+
+
+def band(columns, rows=12):
+    """A Moebius band, wound alike but where its ends meet."""
+    flat = strip(rows, columns)
+    turn, across = 2 * np.pi * flat.vertices[:, 0] / rows, 0.2 * (flat.vertices[:, 1] - columns / 2)
+    out = 1 + across * np.cos(turn / 2)
+    vertices = np.stack([out * np.cos(turn), out * np.sin(turn), across * np.sin(turn / 2)], axis=1)
+    faces = flat.faces.copy()
+    last = faces >= rows * (columns + 1)
+    faces[last] = columns - (faces[last] - rows * (columns + 1))
+    return Mesh(vertices[: rows * (columns + 1)], faces, flat.pairs)
+
+
+def projective_plane():
+    """Half of the faces of an icosahedron, opposite vertices of which are one: closed and one-sided."""
+    ring = [(0, 1 + k, 1 + (k + 1) % 5) for k in range(5)] + [
+        (1 + k, 1 + (k + 1) % 5, 1 + (k + 3) % 5) for k in range(5)
+    ]
+    return Mesh(np.random.default_rng(0).normal(size=(6, 3)), np.array(ring, np.int32))
+
+
+def slab(count, thickness=0.16):
+    """Random points on a closed box with two walls close to each other."""
+    random = np.random.default_rng(0)
+    size = np.array([2, 2, thickness])
+    points, axis = random.uniform(-0.5, 0.5, (count, 3)) * size, np.arange(count) % 8
+    axis = np.where(axis < 7, 2, np.arange(count) // 8 % 2)
+    points[np.arange(count), axis] = random.choice([-0.5, 0.5], count) * size[axis]
+    return points
+
+
+def figure_eight(count):
+    """Random points on a ring whose section is an eight: closed, and passing through itself."""
+    turn, angle = np.random.default_rng(0).uniform(0, 2 * np.pi, (2, count))
+    radius = 1.2 + 0.6 * np.sin(turn)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.3 * np.sin(2 * turn)], axis=1)
+
+
+def leaves(count, pages):
+    """Points on squares that meet in a line, at angles in degrees."""
+    (x, y, _), turn = shapes.square(count // len(pages)).T, np.radians(pages)
+    return np.concatenate([np.stack([(1 + x) * np.cos(a), y, (1 + x) * np.sin(a)], axis=1) for a in turn])
+
+
+SHEETS = {  # and how many pieces their covers have, of which Euler characteristic each
+    "triangle": (Mesh(np.eye(3), np.array([[0, 1, 2]], np.int32)), [2]),
+    "two triangles": (strip(1, 1), [2]),
+    "a strip of one quad's width": (strip(4, 1), [2]),
+    "a patch": (strip(3, 4), [2]),
+    "triangles that touch": (touching(), [2, 2]),
+    "a patch with a hole": (strip(3, 3).of_faces(~np.isin(np.arange(18), [4, 13])), [0]),
+    "a closed one": (octahedron(), [2, 2]),
+    "a one-sided band": (band(3), [0]),
+    "one of a quad's width": (band(1), [0]),
+    "a closed one with one side": (projective_plane(), [2]),
+    "pages": (book([0, 90, 135]), [2]),
+    "crossed": (book([0, 90, 180, 270]), [2]),
+    "a finned patch": (finned(), [2]),
+    "two chambers": (in_halves(), [2, 2, 2]),
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_covers_any_sheet(name):
+    sheet, euler = SHEETS[name]
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    assert [shapes.euler(piece) for piece in shapes.components(cover)] == euler
+    np.testing.assert_allclose(cover.face_areas().sum(), 2 * sheet.face_areas().sum(), rtol=1e-3)
+    edges, counts = sheet.edge_counts()
+    border = sheet.vertices[np.setdiff1d(edges[counts == 1], edges[counts > 2])]
+    assert len(border) == 0 or KDTree(cover.vertices).query(border)[0].max() == 0
+
+
+def test_layers_are_a_hair_apart_and_meet_at_the_border():
+    """Each faces away from the sheet, and the quads of the sheet are there twice."""
+    sheet = strip(5, 4)
+    cover = both_sides(sheet, CELL)
+    assert (sheet.pairs, cover.pairs) == (20, 40)
+    for half in (cover.faces[:40], cover.faces[40:80]):
+        a, b, c = (cover.vertices[half[:, k]] for k in range(3))
+        up = np.cross(b - a, c - a)[:, 2]
+        np.testing.assert_allclose(np.sort(up), np.repeat([-1.0, 1.0], 20), rtol=1e-3)
+    ends = cover.vertices[np.sort(cover.quads, axis=1)]
+    np.testing.assert_allclose(np.ptp(ends[..., :2], axis=1), 1)  # four corners of a unit square
+    np.testing.assert_allclose(np.ptp(ends[..., :2].sum(axis=2), axis=1), 2)
+    inside = (cover.vertices[:, :2] > 0).all(axis=1) & (cover.vertices[:, :2] < [5, 4]).all(axis=1)
+    assert inside.sum() == 2 * 4 * 3
+    np.testing.assert_allclose(np.abs(cover.vertices[inside, 2]), 0.5 * HAIR * CELL)
+    np.testing.assert_array_equal(cover.vertices[~inside, 2], 0)
+
+
+def test_the_outer_layer_of_a_closed_sheet_faces_out():
+    volumes = sorted(shapes.signed_volume(piece) for piece in shapes.components(both_sides(octahedron(), CELL)))
+    np.testing.assert_allclose(volumes, [-4 / 3, 4 / 3], rtol=1e-3)
+    assert -volumes[0] < 4 / 3 < volumes[1]
+
+
+def test_faces_may_be_wound_unlike():
+    sheet = strip(4, 3)
+    faces = np.where(np.arange(len(sheet.faces))[:, None] % 3 == 0, sheet.faces[:, ::-1], sheet.faces)
+    cover, alike = both_sides(Mesh(sheet.vertices, faces), CELL), both_sides(replace(sheet, pairs=0), CELL)
+    assert is_closed_manifold(cover)
+    assert len(cover.vertices) == len(alike.vertices)
+    assert KDTree(alike.vertices).query(cover.vertices)[0].max() < 1e-9
+
+
+def test_nothing_has_no_sides():
+    assert not len(both_sides(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), CELL).faces)
+
+
+@pytest.mark.parametrize("pages", [[0, 90, 180], [200, 10, 100, 310], [0, 20, 40, 60, 80]])
+def test_sides_that_face_each_other_are_joined(pages):
+    """In the wedge between neighbouring pages lies one vertex for each inside of the line, halfway between them."""
+    sheet = book(pages)
+    cover, n = both_sides(sheet, CELL), len(pages)
+    inside = cover.vertices[np.isclose(cover.vertices[:, 2], 1, atol=CELL * HAIR)]
+    inside = inside[np.hypot(*inside.T[:2]) < CELL]
+    assert len(inside) == n
+    turn = np.sort(np.degrees(np.arctan2(inside[:, 1], inside[:, 0])) % 360)
+    ends = np.sort(pages)
+    halfway = 0.5 * (ends + np.append(ends[1:], ends[0] + 360)) % 360
+    np.testing.assert_allclose(turn, np.sort(halfway), atol=1)
+
+
+def test_a_fold_beside_a_line_is_no_other_order_of_the_sheets():
+    """Where a page is bent to the far side of the one beside it, at one vertex next to the line."""
+    sheet = book([0, 30, 180])
+    turn, z = np.radians([0, 30, 180]), np.arange(4.0)
+    edges = [np.column_stack([np.tile([3 * np.cos(a), 3 * np.sin(a)], (4, 1)), z]) for a in turn]
+    near = [[4 * page + k for k in range(4, 8)] for page in range(3)]
+    quads = [(a[k], a[k + 1], a[k + 1] + 12, a[k] + 12) for a in near for k in range(3)]
+    a, b, c, d = np.array(quads).T
+    faces = np.concatenate([sheet.faces, np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    sheet = Mesh(np.concatenate([sheet.vertices, *edges]), faces.astype(np.int32))
+    sheet.vertices[9] = np.cos(np.radians(10)), -np.sin(np.radians(10)), 1
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    assert shapes.euler(cover) == 2
+
+
+@pytest.mark.parametrize("turned", [(), (1,), (0, 2)])
+@pytest.mark.parametrize("length", [12, 30])
+def test_a_stretch_of_folds_is_no_other_order_of_the_sheets(turned, length):
+    """A third of a line, along which faces of the first page lie beyond the second one."""
+    pages = strip(length, 1), strip(length, 1), strip(length, 1)
+    places, faces = [], []
+    for number, (page, turn) in enumerate(zip(pages, np.radians([0, 30, 180]), strict=True)):
+        along, out = page.vertices[:, 0], page.vertices[:, 1]
+        turn = np.where((number == 0) & (along > length / 3) & (along < 2 * length / 3), np.radians(50), turn)
+        places.append(np.column_stack([out * np.cos(turn), out * np.sin(turn), along]))
+        faces.append((page.faces[:, ::-1] if number in turned else page.faces) + len(page.vertices) * number)
+    vertices, row = np.unique(np.concatenate(places).round(9), axis=0, return_inverse=True)
+    cover = both_sides(Mesh(vertices, row.reshape(-1)[np.concatenate(faces)].astype(np.int32)), CELL)
+    assert is_closed_manifold(cover)
+    assert shapes.euler(cover) == 2
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_the_sheet_the_cover_is_manifold(seed):
+    """Of triangles that share vertices at random, many of them at an edge."""
+    random = np.random.default_rng(seed)
+    faces = np.unique(np.sort([random.choice(9, 3, replace=False) for _ in range(24)], axis=1), axis=0)
+    sheet = Mesh(random.normal(size=(9, 3)), random.permuted(faces, axis=1).astype(np.int32))
+    assert (sheet.edge_counts()[1] > 2).any()
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    np.testing.assert_allclose(cover.face_areas().sum(), 2 * sheet.face_areas().sum(), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("points", "same"),
+    [
+        (shapes.torus(2000), True),
+        (shapes.disc(800), True),
+        (shapes.junction(2400), True),
+        (leaves(2400, [0, 15, 180]), False),
+        (leaves(2400, [0, 120, 240]), False),
+        (shapes.moebius(1500), True),
+        (shapes.scattered_sphere(150), False),
+        (shapes.sphere(20_000), False),
+        (slab(1500), True),
+        (figure_eight(3000), False),
+    ],
+    ids=["torus", "disc", "junction", "wedge", "Y", "moebius", "sparse", "dense", "close walls", "crossed"],
+)
+def test_a_run_covers_the_single_layer_where_that_is_the_whole_surface(points, same):
+    """It is neither sparse nor dense, does not pass through itself, and where sheets meet they do not run side by side
+    and samples show that they meet, which those of sheets at the same angles to each other do not."""
+    run = reconstruct(points, Settings(resolution=48, surface="both"))
+    assert is_of_sheet(run) == same
+
+
+def test_dense_sheets_hardly_more_than_a_cell_apart_are_not_joined():
+    ball, gap = shapes.scattered_sphere(4000), 0.15
+    points = np.concatenate([ball - [1 + gap / 2, 0, 0], ball * [-1, 1, 1] + [1 + gap / 2, 0, 0]])
+    run = reconstruct(points, Settings(resolution=48))
+    assert run.report["spacing"] < 0.6 * run.field.spacing
+    assert gap < 1.4 * run.field.spacing
+    assert [shapes.euler(part) for part in shapes.components(run.surface)] == [2, 2, 2, 2]
+
+
+def house(seed, ground_below):
+    """Walls and a flat roof on a square ground, which goes on inside or does not."""
+    random, n, side, height = np.random.default_rng(seed), 3000, 0.25, 0.3
+    ground = random.uniform(-0.3, 0.3, (int(0.36 * n), 2))
+    inside = (np.abs(ground) < side / 2).all(axis=1)
+    roof = random.uniform(-side / 2, side / 2, (int(side**2 * n), 2))
+    along, up = random.uniform(-side / 2, side / 2, (4, 225)), random.uniform(0, height, (4, 225))
+    far = np.full(225, side / 2)
+    walls = [
+        np.column_stack([*pair, z])
+        for *pair, z in zip([far, -far, along[2], along[3]], [along[0], along[1], far, -far], up, strict=True)
+    ]
+    level = [np.column_stack([x, np.full(len(x), z)]) for x, z in ((ground[ground_below | ~inside], 0), (roof, height))]
+    return np.concatenate([*walls, *level])
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_the_cover_of_a_house_has_an_inside_and_an_outside(seed):
+    """At the corners of the walls faces are folded, and angles of single ones would let a wall pass the ground."""
+    run = reconstruct(house(seed, True), Settings(resolution=48, surface="both"))
+    assert (run.sheet.edge_counts()[1] > 2).any()
+    assert [shapes.euler(part) for part in shapes.components(run.surface)] == [2, 2]
+    assert is_of_sheet(run)
+
+
+def test_walls_on_a_ground_that_ends_there_have_the_cover_of_one_sheet():
+    """Though they look like sheets that meet to samples on either side of the crease."""
+    run = reconstruct(house(0, False), Settings(resolution=48, surface="both"))
+    assert is_of_sheet(run)
+    assert shapes.euler(run.surface) == 2
+
+
+def test_a_run_leaves_a_torn_sheet_alone(monkeypatch):
+    """As if samples were far off it."""
+    assert is_of_sheet(reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both")))
+    monkeypatch.setattr(extract, "_TORN", 1e-9)
+    assert not is_of_sheet(reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both")))
+
+
+def test_a_run_leaves_a_one_sided_sheet_alone_that_touches_itself(monkeypatch):
+    found = extract.sheet_of_crossings
+
+    def touching(*given):
+        """With a flap on one of its edges."""
+        sheet, unoriented = found(*given)
+        flap = [*sheet.faces[0, :2], len(sheet.vertices)]
+        return Mesh(np.append(sheet.vertices, [[0, 0, 0]], axis=0), np.append(sheet.faces, [flap], axis=0)), unoriented
+
+    monkeypatch.setattr(extract, "sheet_of_crossings", touching)
+    run = reconstruct(shapes.moebius(1500), Settings(resolution=48))
+    assert set(run.surface.edge_counts()[1]) == {2}
+
+
+def is_of_sheet(run):
+    """Whether all vertices of the double cover lie within half a hair of those of the single layer, or of the middles
+    of its edges."""
+    middles = run.sheet.vertices[run.sheet.edge_counts()[0]].mean(axis=1)
+    places = np.concatenate([run.sheet.vertices, middles])
+    apart = KDTree(places).query(run.surface.vertices)[0] / run.field.spacing
+    return apart.max() <= 0.5 * HAIR + 1e-9

@@ -1,0 +1,157 @@
+"""Which samples have several sheets near them, and what is known of the sheets there."""
+
+import numpy as np
+import pytest
+
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.edges.meeting_edges import _least
+from core.surface.edges.meetings import _goes_past, _grown, _linked, find_meetings
+from core.surface.edges.sheets import sheets_near
+from tests import shapes
+
+
+def fitted(points, normals):
+    return fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
+
+
+def crossed():
+    """Two squares that cross along the y axis, z = 0 and x = 0."""
+    flat = shapes.square(1200)
+    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
+    return fitted(np.concatenate([flat, flat[:, [2, 1, 0]] + np.array([0, 0, 1e-3])]), normals)
+
+
+def ended(turned):
+    """A floor, z = 0, and a wall, x = 0, that ends on it."""
+    flat = shapes.square(1200)
+    wall = flat[:, [2, 1, 0]] + np.array([0, 0, 1.02])
+    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
+    if turned:
+        return fitted(np.concatenate([wall, flat]), normals[::-1])
+    return fitted(np.concatenate([flat, wall]), normals)
+
+
+def cube():
+    """With the normals of its faces."""
+    points = shapes.cube(2400)
+    normals = np.zeros_like(points)
+    normals[np.arange(len(points)), np.abs(points).argmax(axis=1)] = 1
+    return fitted(points, normals)
+
+
+@pytest.mark.parametrize("name", ["sphere", "torus", "cube"])
+def test_one_sheet_meets_none(name):
+    """Not even at the edges of a cube, where two faces end."""
+    if name == "cube":
+        surface = cube()
+    elif name == "sphere":
+        surface = fitted(shapes.sphere(1000), shapes.sphere(1000))
+    else:
+        points = shapes.torus(2000)
+        ring = points * [1, 1, 0] / np.linalg.norm(points[:, :2], axis=1, keepdims=True)
+        surface = fitted(points, (points - ring) / 0.4)
+    assert not find_meetings(surface).at.any()
+
+
+def test_samples_are_linked_by_one_that_is_alike_to_both():
+    rng, n, k = np.random.default_rng(0), 60, 6
+    nearest = np.column_stack([np.arange(n), *(rng.permutation(n)[:n] for _ in range(k - 1))])
+    alike, sure = rng.random((n, k)) < 0.4, rng.random(n) < 0.8
+    near = np.zeros((n, n), bool)
+    for i, j in np.argwhere(alike):
+        near[i, nearest[i, j]] |= sure[i] & sure[nearest[i, j]]
+    near |= near.T
+    i, j = rng.integers(0, n, (2, 500))
+    expected = [(near[a] & near[b]).any() for a, b in zip(i, j, strict=True)]
+    assert 0.1 < np.mean(expected) < 0.9
+    np.testing.assert_array_equal(_linked(i, j, nearest, alike, sure), expected)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_sheet_goes_past_another_where_it_has_samples_on_both_sides(turned):
+    """A floor goes past a wall that ends on it, and the wall not past the floor, in either order."""
+    surface = ended(turned)
+    middle = np.hypot(surface.points[:, 0], surface.points[:, 2]) < 2 * np.median(surface.spacing)
+    near = np.flatnonzero(middle & (np.abs(surface.points[:, 1]) < 0.6))
+    i, j = (each.reshape(-1) for each in np.meshgrid(near, near))
+    close = np.linalg.norm(surface.points[i] - surface.points[j], axis=1) < 2 * np.median(surface.spacing)
+    same = surface.normals[i, 2] == surface.normals[j, 2]
+    found = _goes_past(i, j, surface)
+    assert (found[~same & close] == 1).mean() > 0.9
+    assert not found[same].any()
+    meet = find_meetings(surface)
+    assert meet.at.sum() > 50
+    assert meet.through < 0.05
+    assert meet.beside == 0
+
+
+def test_crossing_squares_meet_along_their_line_only():
+    surface = crossed()
+    away = np.hypot(surface.points[:, 0], surface.points[:, 2]) / np.median(surface.spacing)
+    meet = find_meetings(surface)
+    found = meet.at
+    inside = np.abs(surface.points[:, 1]) < 0.8
+    assert found[(away < 1) & inside].all()
+    assert not found[away > 9].any()
+    assert meet.through > 0.25
+
+
+def test_weak_marks_count_where_others_lead_to_a_sure_one():
+    """Along a row of samples, each beside the four next to it."""
+    n = 60
+    nearest = (np.arange(n)[:, None] + [0, -1, 1, -2, 2]) % n
+    sure, weak = np.zeros(n, bool), np.zeros(n, bool)
+    sure[10], weak[5:20] = True, True
+    weak[[22, 23]], weak[30:40] = True, True  # two steps on, and too far
+    weak[12] = weak[15] = False
+    expected = weak & (np.arange(n) < 20)
+    np.testing.assert_array_equal(_grown(sure, weak, nearest), expected)
+    assert not _grown(np.zeros(n, bool), weak, nearest).any()
+
+
+def test_sheets_side_by_side_meet():
+    """At .7 spacings, seen by samples beyond the nearest few."""
+    points = shapes.sheets(2400, gap=0.04)
+    surface = fitted(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    assert 0.8 * np.median(surface.spacing) > 0.04
+    inner = (np.abs(points[:, :2]) < 0.8).all(axis=1)
+    meet = find_meetings(surface)
+    assert meet.at[inner].mean() > 0.95
+    assert meet.through == 0
+    assert meet.beside > 0.95
+
+
+def test_a_node_near_a_crossing_knows_both_sheets():
+    surface, cell = crossed(), 0.05
+    rng = np.random.default_rng(0)
+    x = rng.uniform([-0.07, -0.5, -0.07], [0.07, 0.5, 0.07], (200, 3))
+    nobody = [np.full(len(x), -1)] * 6
+    found = sheets_near(surface, x, nobody, cell)
+    assert (np.bincount(found.node, minlength=200) == 2).all()
+    level = np.abs(found.axis[:, 2]) > 0.7
+    np.testing.assert_allclose(np.abs(found.axis[level]) @ [0, 0, 1], 1, atol=1e-6)
+    np.testing.assert_allclose(np.abs(found.tau[level]), np.abs(x[found.node[level], 2]), atol=2e-3)
+    np.testing.assert_allclose(np.abs(found.tau[~level]), np.abs(x[found.node[~level], 0]), atol=2e-3)
+
+
+def test_a_sheet_is_told_to_the_neighbour_that_does_not_know_it():
+    surface, cell = crossed(), 0.05
+    unsure = (np.abs(surface.points[:, 0]) < 1e-9) & (surface.points[:, 1] > 0)
+    surface.confidence[unsure] = 0.5
+    x = np.array([[0.03, -0.3, 0.02], [0.03, 0.3, 0.02]])
+    nobody = np.full(2, -1)
+    assert np.bincount(sheets_near(surface, x, [nobody] * 6, cell).node).tolist() == [2, 1]
+    told = sheets_near(surface, x, [np.array([1, -1])] + [nobody] * 5, cell)
+    assert np.bincount(told.node).tolist() == [2, 2]
+    assert np.sort(np.abs(told.tau[told.node == 1])) == pytest.approx([0.02, 0.03], abs=2e-3)
+
+
+def test_of_lines_of_one_edge_the_first_of_least_cost_is_chosen(random):
+    key, cost = random.integers(0, 20, 300), random.integers(0, 4, 300) / 4
+    best = {}
+    for row, each in enumerate(key.tolist()):
+        if each not in best or cost[row] < cost[best[each]]:
+            best[each] = row
+    assert np.flatnonzero(_least(key, cost)).tolist() == sorted(best.values())
+    assert _least(key[:0], cost[:0]).shape == (0,)

@@ -1,0 +1,57 @@
+"""The distance of samples to a mesh, by closed form and against exact distances."""
+
+import igl
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core import Mesh
+from core.surface.meshing.misfit import askew, distances
+
+SQUARE = Mesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+
+
+def test_points_above_a_square():
+    points = np.random.default_rng(0).uniform([0, 0, -1], [1, 1, 1], (500, 3))
+    assert distances(SQUARE, points).mean() == pytest.approx(np.abs(points[:, 2]).mean())
+
+
+def test_points_that_the_mesh_does_not_reach():
+    assert distances(SQUARE, np.array([[9.0, 0.5, 0]])).mean() == pytest.approx(8, abs=0.5)
+
+
+def test_agrees_with_exact_distances_to_the_triangles():
+    rng = np.random.default_rng(0)
+    at = np.linspace(0, 3, 21)
+    x, y = (each.reshape(-1) for each in np.meshgrid(at, at, indexing="ij"))
+    corner = (np.arange(20)[:, None] * 21 + np.arange(20)).reshape(-1, 1)
+    faces = (corner + np.array([[[0, 21, 22]], [[0, 22, 1]]])).reshape(-1, 3).astype(np.int32)
+    mesh = Mesh(np.column_stack([x, y, np.sin(2 * x) * np.cos(y)]), faces)
+    points = mesh.vertices[rng.integers(0, len(x), 2000)] + rng.normal(0, 0.1, (2000, 3))
+    exact = np.sqrt(igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)[0]).mean()
+    assert 0.9 * exact < distances(mesh, points).mean() <= 1.001 * exact
+
+
+def test_no_faces():
+    assert distances(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), np.zeros((1, 3))) == np.inf
+
+
+def test_many_points_count_alike():
+    points = np.random.default_rng(0).uniform([0, 0, 0], [1, 1, 1], (20_000, 3))
+    points = points[np.argsort(points[:, 2])]
+    assert distances(SQUARE, points).mean() == pytest.approx(points[:, 2].mean(), rel=0.01)
+
+
+def test_how_much_is_turned_away_from_the_samples():
+    """A floor and a steep wall over samples of the floor's plane."""
+    x, y, z = [0, 0, 3, 3, 3.1, 3.1], [0, 1, 0, 1, 0, 1], [0, 0, 0, 0, 1.5, 1.5]
+    mesh = Mesh(np.column_stack([x, y, z]), np.array([[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]], np.int32))
+    samples = np.random.default_rng(0).uniform([0, 0, 0], [4, 1, 0], (500, 3))
+    normals = np.tile([0, 0, -1.0], (500, 1))
+    wall = np.hypot(0.1, 1.5)
+    assert askew(mesh, KDTree(samples), normals) == pytest.approx(wall / (3 + wall))
+
+
+def test_of_no_faces_all_is_turned_away():
+    none = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
+    assert askew(none, KDTree(np.zeros((1, 3))), np.array([[0, 0, 1.0]])) == 1

@@ -1,0 +1,133 @@
+"""Parts of closed shapes that no node of the grid lies in, by closed form and on shapes with a tail or a slit."""
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core import Settings, reconstruct
+from core.field.grid import fit_grid
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.meshing.misfit import distances
+from core.surface.signs.thin_parts import ThinParts, find_thin_parts
+from tests import shapes
+
+
+def tailed_ball(radius):
+    """A ball of radius 1 with a tail of length .8, open where it starts."""
+    ball, rng = shapes.sphere(3000), np.random.default_rng(0)
+    ball = ball[(np.hypot(ball[:, 1], ball[:, 2]) > 1.5 * radius) | (ball[:, 0] < 0)]
+    turn, along = rng.uniform(0, 2 * np.pi, 600), rng.uniform(0.98, 1.8, 600)
+    return np.concatenate([ball, np.column_stack([along, radius * np.cos(turn), radius * np.sin(turn)])])
+
+
+def slit_block(width, n=9000):
+    """A block of 2 x 2 x 1 with a slit along its middle, .6 from one end, through the other."""
+    rng, a, b = np.random.default_rng(0), 1 - width / 2, 1 + width / 2
+    walls = [([0, 0], [2, 0]), ([0, 0], [0, 2]), ([2, 0], [2, 2]), ([0, 2], [a, 2]), ([b, 2], [2, 2])]
+    walls += [([a, 0.6], [a, 2]), ([b, 0.6], [b, 2]), ([a, 0.6], [b, 0.6])]
+    lids = [([0, 0], [2, 0.6]), ([0, 0.6], [a, 2]), ([b, 0.6], [2, 2])]
+    faces = [((*low, 0), (*high, 1)) for low, high in walls]
+    faces += [((*low, z), (*high, z)) for z in (0, 1) for low, high in lids]
+    sides = [np.subtract(high, low) for low, high in faces]
+    areas = np.array([side[side > 0].prod() for side in sides])
+    count = np.ceil(n * areas / areas.sum()).astype(int)
+    return np.concatenate([rng.uniform(*face, (m, 3)) for face, m in zip(faces, count, strict=True)])
+
+
+@pytest.fixture(scope="module")
+def ball():
+    """The local surface of a ball, its grid of 32 cells, and signed distances to it at the nodes."""
+    points = shapes.sphere(1000)
+    spacing, grid = local_spacing(points), fit_grid(points, 32)
+    surface = fit_local_surface(points, points, np.ones(len(points)), spacing, 3.0)
+    radius = np.linalg.norm(grid.positions(np.arange(np.prod(grid.shape))), axis=1)
+    return surface, grid, (radius - 1).reshape(grid.shape).astype(np.float32)
+
+
+def test_a_thick_shape_has_none(ball):
+    surface, grid, values = ball
+    assert find_thin_parts(values, surface, grid) is None
+    assert find_thin_parts(-values, surface, grid) is None
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_samples_with_one_side_alone_are_found_and_the_surface_is_lifted_there(ball, sign):
+    """No side changes above the plane z = .3: thin parts, or slits where the other side is all there is."""
+    surface, grid, values = ball
+    high = grid.positions(np.arange(values.size))[:, 2].reshape(values.shape) > 0.3
+    values = sign * np.where(high, np.abs(values), values)
+    parts = find_thin_parts(values, surface, grid)
+    samples, others = (parts.thin, parts.slits)[::sign]
+    assert len(others) == 0
+    above = surface.points[:, 2] > 0.3 + 2 * grid.spacing
+    assert {*map(tuple, surface.points[above])} <= {*map(tuple, samples)}
+    assert samples[:, 2].min() > 0.3 - grid.spacing
+    np.testing.assert_allclose(parts.lift(samples), sign * 0.8 * grid.spacing)
+    away = np.array([0, 0, 1]) * (np.array([[0], [1.5], [2.75], [4], [9]]) * grid.spacing)
+    top = samples[samples[:, 2].argmax()]
+    one = ThinParts(*(top[None], samples[:0])[::sign], samples[:0], grid.spacing)
+    np.testing.assert_allclose(one.lift(top + away) / grid.spacing, sign * np.array([0.8, 0.8, 0.4, 0, 0]), atol=1e-9)
+
+
+def test_values_are_lowered_near_the_surface_alone(ball):
+    surface, grid, values = ball
+    given = np.abs(values)
+    parts, lifted = find_thin_parts(given, surface, grid), given.copy()
+    parts.lower(lifted, grid)
+    near = given <= 2 * grid.spacing
+    np.testing.assert_array_equal(lifted[~near], given[~near])
+    at = grid.positions(np.flatnonzero(near))
+    np.testing.assert_allclose(lifted[near], given[near] - parts.lift(at), atol=1e-6)
+
+
+def test_slits_give_way_to_clear_samples_and_thin_parts_do_not():
+    """Over a cell, from where they are half a cell nearer to where these are."""
+    at = np.array([[0.0, 0, 0], [0.75, 0, 0], [1, 0, 0], [1.25, 0, 0], [2, 0, 0]])
+    none, here, clear = np.empty((0, 3)), at[:1], at[-1:]
+    np.testing.assert_allclose(ThinParts(none, here, clear, 1.0).lift(at), -0.8 * np.array([1, 1, 0.5, 0, 0]))
+    np.testing.assert_allclose(ThinParts(here, none, clear, 1.0).lift(at), 0.8 * np.array([1, 1, 1, 1, 0.8]))
+
+
+def test_a_wall_is_kept_with_something_thinner_than_a_cell_right_behind_it():
+    """A rod along an arc under the skin of a ball took the skin with it, whose samples were up to .77 cells off."""
+    rng, ball = np.random.default_rng(0), shapes.sphere(6000)
+    along, turn = rng.uniform(-0.6, 0.6, 800), rng.uniform(0, 2 * np.pi, 800)
+    depth = 0.94 + 0.01 * np.cos(turn)
+    rod = np.column_stack([depth * np.cos(along), depth * np.sin(along), 0.01 * np.sin(turn)])
+    run = reconstruct(np.concatenate([ball, rod]), Settings(resolution=64, surface="single", denoise=0))
+    assert run.field.spacing > 0.02
+    skin = ball[np.arccos(np.clip(ball[:, 0], -1, 1)) < 0.8]
+    assert distances(run.sheet, skin).max() < 0.2 * run.field.spacing
+
+
+@pytest.mark.parametrize(("surface", "band"), [("single", None), ("signed", None), ("single", 4.0)])
+def test_a_tail_thinner_than_a_cell_is_kept(surface, band):
+    """It was lost for 14 cells, when the mesh was where signs change."""
+    run = reconstruct(tailed_ball(0.015), Settings(resolution=64, surface=surface, band=band, denoise=0))
+    mesh = run.sheet if surface == "single" else run.surface
+    assert run.field.spacing > 2 * 0.015
+    assert set(mesh.edge_counts()[1]) == {2}
+    assert [shapes.euler(piece) for piece in shapes.components(mesh)] == [2]
+    assert KDTree(mesh.vertices).query(run.points)[0].max() < 1.5 * run.field.spacing
+    tail = mesh.vertices[mesh.vertices[:, 0] > 1.1]
+    assert tail[:, 0].max() > 1.75
+    assert (np.hypot(tail[:, 1], tail[:, 2]) - 0.015).max() < 0.3 * run.field.spacing
+
+
+def test_a_slit_narrower_than_a_cell_is_kept():
+    """Of the samples .028 were more than a cell from the mesh, when that was where signs change."""
+    points = slit_block(0.05) @ shapes.random_rotation(2).T
+    run = reconstruct(points, Settings(resolution=32, surface="signed", denoise=0))
+    assert run.field.spacing > 0.05
+    assert (KDTree(run.surface.vertices).query(run.points)[0] > run.field.spacing).mean() < 0.01
+    assert set(run.surface.edge_counts()[1]) == {2}
+
+
+def test_thin_parts_away_from_places_are_left():
+    parts = ThinParts(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[0.0, 9, 0]]), np.empty((0, 3)), 1.0)
+    assert parts.away_from(np.empty((0, 3))) is parts
+    left = parts.away_from(np.array([[3.9, 0, 0], [0, 9, 4.1]]))
+    np.testing.assert_array_equal(left.thin, [[9, 0, 0]])
+    np.testing.assert_array_equal(left.slits, [[0, 9, 0]])
+    assert parts.away_from(np.array([[0, 0, 1.0], [9, 0, 1], [0, 9, 1]])) is None

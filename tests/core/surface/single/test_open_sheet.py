@@ -1,0 +1,124 @@
+"""Single layers of open, creased surfaces: the zero set of their signed distances, as far as their rims."""
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from core import Settings, reconstruct
+from core.errors import MissingDependency
+from core.io.points import read_points
+from core.surface.single.open_sheet import _apart
+from tests import shapes
+
+
+def single(points, **settings):
+    return reconstruct(points, Settings(**{"resolution": 64, "surface": "single", "denoise": 0, **settings}))
+
+
+def box(n, seed):
+    """Random samples of a box without a lid, side 2, and its rotation."""
+    random, turn = np.random.default_rng(seed), shapes.random_rotation(seed)
+    points, face = random.uniform(-1, 1, (n, 3)), random.integers(0, 5, n)
+    points[np.arange(n), face // 2] = np.where(face % 2, 1, -1)
+    return points @ turn.T, turn
+
+
+@pytest.mark.parametrize(("n", "seed"), [(1500, 1), (3000, 4), (8000, 3)])
+def test_an_open_box_is_one_sheet_with_sharp_edges(n, seed):
+    """Its creases looked as if sheets met: they had edges of three faces, and could not be wound alike."""
+    points, turn = box(n, seed)
+    run = single(points)
+    assert run.report["warnings"] == []
+    assert (shapes.euler(run.sheet), run.sheet.border_loops()) == (1, 1)
+    assert run.sheet.edge_counts()[1].max() == 2
+    off = np.abs(np.abs(run.sheet.vertices @ turn).max(axis=1) - 1)
+    assert np.percentile(off, 99) < 0.15 * run.field.spacing
+    low = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+    height = np.linspace(-0.9, 0.9, 50)
+    edges = np.concatenate([np.column_stack([np.tile(corner, (50, 1)), height]) for corner in low])
+    to_edge = KDTree(run.sheet.vertices).query(edges @ turn.T)[0] / run.field.spacing
+    assert np.median(to_edge) < 0.5
+
+
+@pytest.mark.parametrize(("n", "seed"), [(6000, 4), (8000, 2), (8000, 6), (8000, 9)])
+def test_an_open_box_has_no_holes_along_its_edges(n, seed):
+    """Corners that no node lies in were taken for thin parts, also beside rims, and what is off such parts for the end
+    of the sheet."""
+    sheet = single(box(n, seed)[0]).sheet
+    assert (shapes.euler(sheet), sheet.border_loops()) == (1, 1)
+
+
+def test_its_rim_is_where_the_samples_end():
+    points, turn = box(8000, 3)
+    sheet = single(points).sheet
+    edges, counts = sheet.edge_counts()
+    rim = sheet.vertices[np.unique(edges[counts == 1])] @ turn
+    spacing = np.sqrt(20 / 8000)
+    assert np.abs(rim[:, 2] - 1).max() < 1.5 * spacing
+
+
+def test_a_creased_scan_is_wound_alike():
+    """A bust, open below: of its dual contour 246 edges have three faces or more, and 293 cannot be wound alike. What
+    lies between its sides was in ten pieces, and went to and fro between the two walls of its foot."""
+    run = single(read_points("tests/data/bust.ply"), resolution=128, denoise="auto")
+    assert run.sheet.edge_counts()[1].max() == 2
+    assert len(shapes.components(run.sheet)) == run.sheet.border_loops() == 1
+    (warning,) = run.report["warnings"]
+    assert "4% of the points lie more than 0.5 cells off the single layer" in warning
+    away = KDTree(run.sheet.vertices).query(run.points)[0] / run.field.spacing
+    assert np.percentile(away, 99) < 1.2
+    assert away.max() < 3  # behind the ears, in slits narrower than two cells
+
+
+def test_sheets_that_pass_through_each_other_askew_are_wound_alike():
+    """Two squares at 56 degrees, whose dual contour cannot be."""
+    random, turn = np.random.default_rng(10), shapes.random_rotation(10)
+    flat, other = random.uniform(-1, 1, (2, 1500, 3))
+    flat[:, 2], other[:, 0] = 0, 0
+    c, s = np.cos(0.6), np.sin(0.6)
+    points = np.concatenate([flat, other @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])]) @ turn.T
+    run = single(points, resolution=128)
+    assert run.report["warnings"] == []
+    assert run.sheet.edge_counts()[1].max() == 2
+    assert KDTree(run.sheet.vertices).query(points)[0].max() < 1.5 * run.field.spacing
+
+
+@pytest.mark.parametrize("n", [1500, 8000])
+def test_a_band_gives_the_same(n):
+    points, _ = box(n, 1)
+    whole, band = single(points).sheet, single(points, band=4.0).sheet
+    np.testing.assert_array_equal(band.vertices, whole.vertices)
+    np.testing.assert_array_equal(band.faces, whole.faces)
+
+
+def test_without_openvdb(monkeypatch):
+    """From marching cubes' triangles: the same surface."""
+    points, _ = box(3000, 4)
+    dual = single(points)
+
+    def absent():
+        raise MissingDependency("no OpenVDB")
+
+    monkeypatch.setattr("core.surface.meshing.isosurface.load_openvdb", absent)
+    run = single(points)
+    assert run.report["warnings"] == []
+    assert (shapes.euler(run.sheet), run.sheet.border_loops()) == (1, 1)
+    assert KDTree(dual.sheet.vertices).query(run.sheet.vertices)[0].max() < 1.5 * run.field.spacing
+
+
+def test_sheets_with_one_vertex_in_common_are_parted():
+    vertices = np.random.default_rng(0).normal(size=(10, 3))
+    faces = np.array([[0, 1, 2, 3], [3, 2, 4, 5], [5, 6, 7, 8], [0, 6, 9, 1]])
+    parted, moved = _apart(vertices, faces)
+    np.testing.assert_array_equal(parted[moved], vertices[faces])
+    assert len(parted) == 10 + 2  # 5 and 6 are shared by sheets: the third face's own
+    assert not np.isin(moved[2], moved[[0, 1, 3]]).any()
+    assert np.isin(moved[0][[0, 1]], moved[3]).all()
+
+
+def test_sheets_are_parted_however_many_there_are():
+    count = 40_000  # times their vertices is more than 32 bits hold
+    vertices = np.random.default_rng(0).normal(size=(4 * count, 3))
+    faces = np.arange(4 * count, dtype=np.int32).reshape(-1, 4)
+    parted, moved = _apart(vertices, faces)
+    np.testing.assert_array_equal(parted[moved], vertices[faces])
