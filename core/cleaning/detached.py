@@ -11,26 +11,27 @@ SHEET = 0.25  # thickness of a neighbourhood, below which a sheet may be seen in
 _GAP = 4.0  # times the local spacing on either side, that separates parts
 _OF_ALL, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part: larger ones are no strays
 _LOOKS = 256  # samples of a part whose wider neighbourhoods are looked at
-_ENOUGH = 16  # samples, of which fewer do not tell a cloud from the end of something thin
-_HULL = 0.85, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
-_DENSER = 0.75  # spacing over the median of the cloud, below which a thick part of fewer samples is a cloud
+_FURTHER, _BESIDE = 64, 3.5  # neighbours of a part's samples, of which others so many local spacings away are beside it
+_ENOUGH = 16  # samples, of which fewer do not tell a shell from a cloud
+_HULL = 0.95, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
 _SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where so many times as sparse as the cloud
 
 
 def detached_clouds(around: Surroundings) -> np.ndarray:
-    """(n,) bool: which samples are in a small part of their own that is a cloud. With enough samples that is one that
-    is neither a sheet, be it a noisy one, nor the shell of a convex body; with fewer, a thick one that is denser than
-    the rest; or one so sparse that its samples do not tell."""
+    """(n,) bool: which samples are in a small part of their own that is neither a sheet, be it a noisy one, nor the
+    shell of a convex body, or so sparse that its few samples do not tell."""
     part = _parts(around)
     size = np.bincount(part)
-    relative, (fewest, times) = around.spacing / np.median(around.spacing), _SCANTY
-    thick, denser, sparse, sparser, wires = (
+    fewest, times = _SCANTY
+    sparser = around.spacing > times * np.median(around.spacing)
+    thick, sparse, sparser, wires = (
         np.bincount(part, weights=samples) > 0.5 * size
-        for samples in (around.thick, relative < _DENSER, around.sparse, relative > times, around.wire)
+        for samples in (around.thick, around.sparse, sparser, around.wire)
     )
     scanty = (sparse & (size < _ENOUGH) | sparser & (size < fewest) & ~wires) & ~around.wireframe
-    small = size < min(_OF_ALL * len(part), _OF_LARGEST * size.max())
-    cloud = small & (scanty | thick & (denser | (size >= _ENOUGH)))
+    cloud = (thick | scanty) & (size < min(_OF_ALL * len(part), _OF_LARGEST * size.max()))
+    if not around.wireframe:
+        cloud[_beside_others(around, part, cloud)] = False
     ends, by_part = np.cumsum(size), np.argsort(part, kind="stable")
     for number in np.flatnonzero(cloud & ~scanty & (size >= _ENOUGH)):
         row = by_part[ends[number] - size[number] : ends[number]]
@@ -46,6 +47,16 @@ def _parts(around):
     joined = gap < _GAP * np.minimum(around.spacing[one], around.spacing[other])
     links = coo_matrix((joined[joined], (one[joined], other[joined])), shape=(n, n))
     return connected_components(links, directed=False)[1]
+
+
+def _beside_others(around, part, marked):
+    """The numbers of the parts `marked` (p,) that lie beside others, which are not: at the end of a thin part the eight
+    nearest neighbours of each sample may be of that end, though others are hardly further."""
+    row, n = np.flatnonzero(marked[part]), len(part)
+    distance, other = around.tree.query(around.points[row], k=range(1, 1 + min(_FURTHER, n)), workers=-1)
+    gap = _BESIDE * np.minimum(around.spacing[row, None], around.spacing[other])
+    close = ~marked[part[other]] & (distance < gap)
+    return part[row[close.any(axis=1)]]
 
 
 def _is_sheet(points):

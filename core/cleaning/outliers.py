@@ -44,7 +44,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
       as sparse, which may be a wire sampled less;
     - detached: in a small part of its own that is a cloud rather than a sheet, be it a noisy one, or the shell of a
-      convex body; of too few samples to tell, if it is denser than the cloud or sparse;
+      convex body, or that is sparse and of too few samples to tell;
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
     A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
