@@ -1,0 +1,7 @@
+"""Stage one, from points to bi-directional normals with their confidence, in the way that :mod:`.estimate` is asked for.
+
+mirrors, reflection            : by reflection across the bisectors of the samples
+planes, shared_planes, creases : told apart where sheets meet at an angle
+energy, energy_torch, adam     : the paper's own way, by minimising its energy
+pca, known                     : where either starts; normals that are given
+"""
