@@ -1,4 +1,4 @@
-"""Stage one, from points to bi-directional normals with their confidence, in the way that :mod:`.estimate` is asked for.
+"""Stage one, from points to bi-directional normals with their confidence, in the way asked of :mod:`.estimate`.
 
 mirrors, reflection            : by reflection across the bisectors of the samples
 planes, shared_planes, creases : told apart where sheets meet at an angle

@@ -77,21 +77,32 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
     for patch in np.flatnonzero(open_patch):
         if _is_spur(mesh, face[parts[patch]], edge, counts, cell):
             drop(parts[patch])
-    basis, bit = {}, {number: k for k, number in enumerate(np.unique(edge[face][rim]).tolist())}
+    rims = _Independent()
     for patch in np.argsort(cost, kind="stable"):
         part = parts[patch]
-        if open_patch[patch]:
-            continue
-        row = 0
-        for number in edge[face[part]][rim[part]].tolist():
-            row ^= 1 << bit[number]
-        while row and row.bit_length() in basis:
-            row ^= basis[row.bit_length()]
-        if row:
-            basis[row.bit_length()] = row
-        else:
+        if not open_patch[patch] and not rims.add(edge[face[part]][rim[part]]):
             drop(part)
     return dropped
+
+
+class _Independent:
+    """Sets of edges of which no sum, without those that it has twice, is another: patches whose rims add up to nothing
+    close a pocket. Kept in echelon form, sets as the bits of integers (linear algebra over GF(2))."""
+
+    def __init__(self):
+        self._by_highest, self._bit = {}, {}
+
+    def add(self, edges) -> bool:
+        """Whether a set, edges (m,) of which those there an even number of times do not count, is no sum of others;
+        only then it is one of them from now on."""
+        row = 0
+        for number in edges.tolist():
+            row ^= 1 << self._bit.setdefault(number, len(self._bit))
+        while row and row.bit_length() in self._by_highest:
+            row ^= self._by_highest[row.bit_length()]
+        if row:
+            self._by_highest[row.bit_length()] = row
+        return bool(row)
 
 
 def _is_spur(mesh, face, edge, counts, cell):
