@@ -20,11 +20,11 @@ _PUBLIC = {
     "settings": ("Settings",),
     "surface.attributes": ("vertex_attributes",),
     "surface.double.both_sides": ("both_sides",),
-    "surface.edges.crossings": ("find_crossings",),
     "surface.double.double_cover": ("double_cover",),
+    "surface.edges.crossings": ("find_crossings",),
     "surface.mesh": ("Mesh",),
-    "surface.signs.sides": ("find_sides",),
     "surface.signed": ("signed_distance",),
+    "surface.signs.sides": ("find_sides",),
     "surface.single.single_layer": ("single_layer",),
 }
 _HOME = {name: module for module, names in _PUBLIC.items() for name in names}

@@ -72,14 +72,16 @@ def _reconstruct(points, settings, constraints, normals, progress):
     stages = _Stages()
     with stages("points"):
         samples = prepare_samples(points, progress.part(0.0, 0.01, "points")).in_spatial_order()
-        given, unmoved = len(np.asarray(points)), samples.given
+        given = len(np.asarray(points))
 
     with stages("cleaning"):
-        cleaning = {}
+        cleaning, unmoved = {}, samples.given
         if normals is None:
             samples, cleaning = clean(samples, settings, progress.part(0.01, 0.09, "cleaning"))
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
         spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
+        rounded = rounding_warning(unmoved, float(np.median(spacing)) * samples.scale)
+        del unmoved
         grid = fit_grid(samples.points, settings.resolution)
         estimate = estimate_cost(spacing, grid, settings, noisy="noisy" in cleaning)
         large = check_budget(estimate, spacing, grid, settings)
@@ -125,7 +127,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "peak_memory_mb": peak_memory_mb(),
         "warnings": [
             *samples.warnings,
-            *rounding_warning(unmoved, float(np.median(spacing)) * samples.scale),
+            *rounded,
             *ignored,
             *large,
             *_too_coarse(spacing, grid),

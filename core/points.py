@@ -142,15 +142,17 @@ def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
 
 def rounding_warning(points: np.ndarray, spacing: float) -> tuple[str, ...]:
     """Says, in one line or none, that coordinates of points (n,3), float64, were rounded to the steps that single
-    precision has so far from the origin, and that these are not small beside the `spacing` of the points."""
+    precision has so far from the origin, and that these are not small beside the `spacing` of the points. Whole numbers
+    around ten million look so, too: the step there is 1."""
     size = np.median(np.abs(points), axis=0)
     axis = size.argmax()
-    if size[axis] > np.finfo(np.float32).max:
+    if np.abs(points[:, axis]).max() > np.finfo(np.float32).max:
         return ()
     step = float(np.spacing(np.float32(size[axis])))
-    steps = points[:, axis] / step
-    even = np.rint(0.5 * steps) == 0.5 * steps
-    if step < _ROUNDED * spacing or (np.rint(steps) != steps).any() or even.mean() > 1 - _ODD:
+    if step < _ROUNDED * spacing:
+        return ()
+    steps = points[:, axis] / np.spacing(np.abs(points[:, axis]).astype(np.float32)).astype(float)
+    if (np.rint(steps) != steps).any() or (np.rint(0.5 * steps) != 0.5 * steps).mean() < _ODD:
         return ()
     return (
         f"coordinates around {size[axis]:g} are in steps of {step:.2g}, {step / spacing:.0%} of the points' spacing: "

@@ -5,21 +5,23 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree
 
-from .surroundings import NEIGHBOURS, Surroundings, thickness
+from ..progress import Progress
+from .surroundings import NEIGHBOURS, SHEET, Surroundings, thickness
 
-SHEET = 0.25  # thickness of a neighbourhood, below which a sheet may be seen in it, a noisy one, too
 _GAP = 4.0  # times the local spacing on either side, that separates parts
 _OF_ALL, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part: larger ones are no strays
 _LOOKS = 256  # samples of a part whose wider neighbourhoods are looked at
-_FURTHER, _BESIDE = 64, 3.5  # neighbours of a part's samples, of which others so many local spacings away are beside it
+_FURTHER, _BESIDE = 64, 3.5  # neighbours of a part's samples; others so many spacings of either away are beside it
 _ENOUGH = 16  # samples, of which fewer do not tell a shell from a cloud
 _HULL = 0.95, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
+_CHUNK = 8192  # samples
 _SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where so many times as sparse as the cloud
 
 
-def detached_clouds(around: Surroundings) -> np.ndarray:
+def detached_clouds(around: Surroundings, progress: Progress) -> np.ndarray:
     """(n,) bool: which samples are in a small part of their own that is neither a sheet, be it a noisy one, nor the
-    shell of a convex body, or so sparse that its few samples do not tell."""
+    shell of a convex body, or so sparse that its few samples do not tell; but for parts that others lie beside, hardly
+    further away than their own samples."""
     part = _parts(around)
     size = np.bincount(part)
     fewest, times = _SCANTY
@@ -31,7 +33,7 @@ def detached_clouds(around: Surroundings) -> np.ndarray:
     scanty = (sparse & (size < _ENOUGH) | sparser & (size < fewest) & ~wires) & ~around.wireframe
     cloud = (thick | scanty) & (size < min(_OF_ALL * len(part), _OF_LARGEST * size.max()))
     if not around.wireframe:
-        cloud[_beside_others(around, part, cloud)] = False
+        cloud[_beside_others(around, part, cloud, progress)] = False
     ends, by_part = np.cumsum(size), np.argsort(part, kind="stable")
     for number in np.flatnonzero(cloud & ~scanty & (size >= _ENOUGH)):
         row = by_part[ends[number] - size[number] : ends[number]]
@@ -49,14 +51,16 @@ def _parts(around):
     return connected_components(links, directed=False)[1]
 
 
-def _beside_others(around, part, marked):
+def _beside_others(around, part, marked, progress):
     """The numbers of the parts `marked` (p,) that lie beside others, which are not: at the end of a thin part the eight
     nearest neighbours of each sample may be of that end, though others are hardly further."""
-    row, n = np.flatnonzero(marked[part]), len(part)
-    distance, other = around.tree.query(around.points[row], k=range(1, 1 + min(_FURTHER, n)), workers=-1)
-    gap = _BESIDE * np.minimum(around.spacing[row, None], around.spacing[other])
-    close = ~marked[part[other]] & (distance < gap)
-    return part[row[close.any(axis=1)]]
+    rows, spacing = np.flatnonzero(marked[part]), around.spacing
+    found, k = np.zeros(len(rows), bool), range(1, 1 + min(_FURTHER, len(part)))
+    for some in progress.chunks(len(rows), _CHUNK):
+        distance, other = around.tree.query(around.points[rows[some]], k=k, workers=-1)
+        close = distance < _BESIDE * np.minimum(spacing[rows[some], None], spacing[other])
+        found[some] = (close & ~marked[part[other]]).any(axis=1)
+    return part[rows[found]]
 
 
 def _is_sheet(points):

@@ -9,10 +9,10 @@ from scipy.spatial import KDTree
 
 from ..given_arrays import finite_points
 from ..progress import Progress
-from .detached import SHEET, detached_clouds
+from .detached import detached_clouds
 from .off_wires import off_wires
 from .quadrics import fit_quadrics
-from .surroundings import Surroundings, thickness
+from .surroundings import SHEET, Surroundings, thickness
 
 MINIMUM_SAMPLES = 100  # fewer leave nothing to compare a sample with
 
@@ -28,7 +28,7 @@ _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
 _CHUNK = 8192  # samples
 
-_DIRTY, _NONE = 0.0005, 1  # share and number of strays above which those close to the surface are looked for as well
+_DIRTY, _LONE = 0.0005, 1  # share and number of strays above which those close to the surface are looked for, too
 _STRICT = 0.7  # share of the limits above that then holds for those beside a surface
 _FITTED = 20  # neighbours of the quadrics that those are measured against
 _HOVERING = 6.0  # distance from the quadric over the largest of the medians around each neighbour
@@ -44,7 +44,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - among wires, where there are more than a few such: lonely, on no line of a wire nearby nor in line with samples
       as sparse, which may be a wire sampled less;
     - detached: in a small part of its own that is a cloud rather than a sheet, be it a noisy one, or the shell of a
-      convex body, or that is sparse and of too few samples to tell;
+      convex body, or that is sparse and of too few samples to tell; with no others hardly further away than its own;
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
     A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
@@ -57,10 +57,10 @@ def find_outliers(points, progress=None) -> np.ndarray:
         part = progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)
         kept = np.flatnonzero(~stray)
         around = Surroundings(points[kept], part.part(0.0, 0.6))
-        dirty = stray.sum() > max(_DIRTY * len(points), _NONE)
+        dirty = stray.sum() > max(_DIRTY * len(points), _LONE)
         found = _beside(around, _STRICT if dirty else 1.0) | _scattered(around, part.part(0.6, 0.7))
         part(0.7)
-        found |= detached_clouds(around)
+        found |= detached_clouds(around, part.part(0.7, 0.8))
         among_wires = off_wires(around, _LONELY)
         if dirty or _many(among_wires, _ASTRAY):
             found |= among_wires

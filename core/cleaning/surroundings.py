@@ -9,6 +9,7 @@ from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
 
 NEIGHBOURS = 8
+SHEET = 0.25  # thickness of a wider neighbourhood, below which a sheet may be seen in it, a noisy one, too
 _SPARSE = 2.5  # spacing over the median of the cloud
 _THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a cloud .3
 _CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane

@@ -1,7 +1,6 @@
 """The samples with their normals, and those around each."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -17,6 +16,7 @@ _CHUNK = 16384  # samples
 class Cloud:
     """points, normals : (n,3) float64     spacing : (n,) float64, local spacing, units of the points
 
+    frames     : (n,2,3) float64, two unit tangents at each sample
     neighbours : (n,k) int, the samples that each one's patch is fitted to, nearest first
     tree       : of the points
     """
@@ -24,6 +24,7 @@ class Cloud:
     points: np.ndarray
     normals: np.ndarray
     spacing: np.ndarray
+    frames: np.ndarray
     neighbours: np.ndarray
     tree: KDTree
 
@@ -35,12 +36,7 @@ class Cloud:
         neighbours = np.empty((tree.n, k - 1), np.int64)
         for part in Progress.of(progress).chunks(tree.n, _CHUNK):
             neighbours[part] = tree.query(tree.data[part], k=k, workers=-1)[1][:, 1:]
-        return cls(points, normals, spacing, neighbours, tree)
+        return cls(points, normals, spacing, tangent_frames(normals), neighbours, tree)
 
     def __len__(self) -> int:
         return len(self.points)
-
-    @cached_property
-    def frames(self) -> np.ndarray:
-        """(n,2,3) float64: two unit tangents at each sample."""
-        return tangent_frames(self.normals)

@@ -3,5 +3,5 @@
 mirrors, reflection            : by reflection across the bisectors of the samples
 planes, shared_planes, creases : told apart where sheets meet at an angle
 energy, energy_torch, adam     : the paper's own way, by minimising its energy
-pca, known                     : where either starts; normals that are given
+pca, known                     : fits of planes alone, the baseline; normals that are given
 """

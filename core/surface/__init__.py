@@ -1,5 +1,7 @@
 """Stage three, from distances to meshes; :mod:`.extract` says which one is made how.
 
+mesh, attributes, signed : meshes, what their vertices know, and the signed distance of closed shapes
+
 edges   : which edges of the grid the surface crosses, and where sheets meet
 signs   : which side of it nodes lie on, and where such signed distances are zero
 single  : the single layer, by signs where there are two sides, by crossed edges elsewhere, and its borders

@@ -382,6 +382,14 @@ def test_bust_is_hollow_and_closed_in_double():
     assert (result.field.sample(result.points) < 0.75 * result.field.spacing).all()
 
 
+def test_coordinates_rounded_far_away_are_said():
+    ball = 10 * shapes.scattered_sphere(2000)
+    for far, told in (([4e5, 5e6, 0], True), ([400, 5000, 0], False)):
+        points = (ball + np.array(far)).astype(np.float32)
+        warnings = reconstruct(points, Settings(resolution=32, surface="none")).report["warnings"]
+        assert any("in steps of 0.5, 6" in line and "% of the points' spacing" in line for line in warnings) == told
+
+
 def test_a_grid_too_coarse_for_the_points_is_said():
     ball = shapes.sphere(2000)
     far = reconstruct(np.concatenate([ball, ball + np.array([200, 0, 0])]), Settings(resolution=32, surface="none"))

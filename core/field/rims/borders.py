@@ -205,10 +205,10 @@ def _within(bridge, n):
 
 
 def across_gaps(rows, outward, cloud: Cloud, bridge: float, spacing=None, step_up=_STEP, most=None, bend=None):
-    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` local spacings, or
-    of those given (m,), away and off the tangent plane, or the patch that `bend` (n,3,3) says where given, by less than
-    the share `step_up` of that: its distance (m,), inf where there is none, and its number (m,). Looks at the `most`
-    nearest samples where given."""
+    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` times its local
+    spacing, or `spacing` (m,) where given, away and off the tangent plane, or the patch that `bend` (n,3,3) says where
+    given, by less than the share `step_up` of that: its distance (m,), inf where there is none, and its number (m,).
+    Looks at the `most` nearest samples where given."""
     points, normals = cloud.points, cloud.normals
     spacing = cloud.spacing[rows] if spacing is None else spacing
     distance, other = cloud.tree.query(points[rows], k=min(_within(bridge, len(cloud)), most or len(cloud)))

@@ -12,11 +12,11 @@ from ...progress import Progress
 from ..edges.first_steps import first_steps
 from ..mesh import Mesh
 from ..meshing.centring import centred
+from ..meshing.corners import into_corners
 from ..meshing.evening import evened
 from ..meshing.isosurface import isosurface
 from ..meshing.pieces import pieces_with_samples
 from ..meshing.triangles import mesh_of
-from .corners import into_corners
 from .layers import laid_apart
 from .leaks import lower_around, shut_leaks
 from .pinholes import find_pinholes

@@ -9,8 +9,8 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
 from ...progress import Progress
-from ..double.corners import into_corners
 from ..mesh import Mesh, in_use
+from ..meshing.corners import into_corners
 from ..meshing.evening import FLAT, vertex_normals
 from ..meshing.isosurface import isosurface
 from .thin_parts import ThinParts

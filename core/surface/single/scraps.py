@@ -86,8 +86,8 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
 
 
 class _Independent:
-    """Sets of edges of which no sum, without those that it has twice, is another: patches whose rims add up to nothing
-    close a pocket. Kept in echelon form, sets as the bits of integers (linear algebra over GF(2))."""
+    """Sets of edges, none of them the sum (symmetric difference) of others: patches whose rims add up to nothing close
+    a pocket. Kept in echelon form, sets as the bits of integers (linear algebra over GF(2))."""
 
     def __init__(self):
         self._by_highest, self._bit = {}, {}

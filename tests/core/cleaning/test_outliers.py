@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from core.cleaning import detached, outliers, surroundings
 from core.cleaning.outliers import find_outliers
 from tests import shapes
 
@@ -66,6 +67,16 @@ def test_sheets_a_spacing_or_two_apart_stay_whole(gap, seed):
     assert find_outliers(np.column_stack([x, np.repeat([0, gap], 5000)])).sum() <= 1
 
 
+def test_chunks_change_nothing(monkeypatch):
+    rng = np.random.default_rng(1)
+    clumps = np.repeat(rng.uniform(-2, 2, (30, 3)), 10, axis=0) + rng.normal(size=(300, 3)) * 0.03
+    points = with_strays(np.vstack([rng.uniform(-1.5, 1.5, (300, 3)), clumps]))[0]
+    whole = find_outliers(points)
+    for module in (outliers, detached, surroundings):
+        monkeypatch.setattr(module, "_CHUNK", 50)
+    np.testing.assert_array_equal(find_outliers(points), whole)
+
+
 def test_strays_beside_the_surface_are_found():
     rng = np.random.default_rng(1)
     points, stray = with_strays(shapes.scattered_sphere(250, seed=5) * (1 + rng.choice([-1, 1], (250, 1)) * 0.15))
@@ -102,6 +113,14 @@ def test_strays_among_wires_are_found_and_the_wires_stay(share):
     dropped = find_outliers(np.vstack([wires, strays]))
     assert dropped[1000:].mean() > 0.6
     assert dropped[:1000].sum() <= 8
+
+
+@pytest.mark.parametrize(("seed", "found"), [(0, 0.8), (2, 0.9)])
+def test_clumps_among_wires_are_found_beside_them_as_well(seed, found):
+    wires, rng = edges_of_a_box(1000), np.random.default_rng(seed)
+    places = rng.uniform(0, 1, (5, 3)) * [1.0, 0.6, 0.4]
+    clumps = np.repeat(places, 10, axis=0) + rng.normal(size=(50, 3)) * 0.015
+    assert find_outliers(np.vstack([wires, clumps]))[1000:].mean() > found
 
 
 def test_of_a_sparse_wire_across_dense_ones_no_more_than_ends_go_with_strays():

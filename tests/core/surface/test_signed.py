@@ -11,7 +11,7 @@ from core.field.grid import fit_grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.progress import Progress
-from core.surface.double.corners import into_corners
+from core.surface.meshing.corners import into_corners
 from core.surface.signed import signed_mesh
 from core.surface.signs.zero_set import sharpened
 from tests import shapes

@@ -6,7 +6,7 @@ import pytest
 from core import Settings, reconstruct
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.double.corners import into_corners
+from core.surface.meshing.corners import into_corners
 from tests import shapes
 
 CELL = 0.05

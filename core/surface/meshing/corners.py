@@ -9,7 +9,7 @@ from ...linalg import row_dots
 from ...lookup import numbered
 from ...progress import Progress
 from ..mesh import edges_of
-from ..meshing.planes import to_planes
+from .planes import to_planes
 
 _TURN = 0.7  # largest cosine between the sides of sheets that form a corner
 _FACING = -0.97  # below this cosine they run close side by side
