@@ -87,18 +87,38 @@ def find_rims(cloud: Cloud, bend, bridge: float, progress=None) -> Rims:
 def _find_rims(part, cloud, bend, bridge):
     points, normals, frames = cloud.points, cloud.normals, cloud.frames[part]
     spacing, neighbours = cloud.spacing[part], cloud.neighbours[part]
-    n, k = neighbours.shape
     own, theirs = normals[part], normals[neighbours]
     step = points[neighbours] - points[part, None]
     flat = one_sheet(step, own[:, None], theirs)
     same, laid, crease, limit = _laid_flat(step, own, theirs, spacing, flat)
-    x, y = np.moveaxis(np.einsum("nki,nai->nka", laid, frames), 2, 0)
+    place = np.einsum("nki,nai->nka", laid, frames)
+    width, middle, bounding = _widest_angles(place, same)
+    outward = np.einsum("na,nai->ni", np.stack([np.cos(middle), np.sin(middle)], axis=1), frames)
+    ends = np.einsum("nea,nai->nei", np.take_along_axis(place, bounding[..., None], axis=1), frames)
+    beside = np.take_along_axis(neighbours, bounding, axis=1)
 
-    angle = np.where(same, np.arctan2(y, x), np.inf)
+    gap = (width > GAP) & same.any(axis=1)
+    distance = np.full(len(gap), np.inf)
+    rows = np.flatnonzero(gap)
+    distance[rows], other = across_gaps(part.start + rows, outward[rows], cloud, bridge, bend=bend)
+    bridged = np.isfinite(distance)
+    rows, other = rows[bridged[rows]], other[bridged[rows]]
+    bridged[rows] = ~walled(part.start + rows, other, cloud)
+    reach = np.zeros(len(gap))
+    reach[bridged] = bridged_reach(distance[bridged], spacing[bridged])
+    margin = np.repeat(RIM * spacing[:, None], 3, axis=1)
+    return Rims(
+        gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, np.zeros(len(gap)), crease, limit
+    )
+
+
+def _widest_angles(place, same):
+    """The widest angle between those neighbours, at places (n,k,2) around each sample, that are of the `same` sheet,
+    (n,k) bool: how wide, the angle of its middle, (n,) each, and the columns of the two that bound it, (n,2)."""
+    every, count = np.arange(len(place)), same.sum(axis=1)
+    angle = np.where(same, np.arctan2(place[..., 1], place[..., 0]), np.inf)
     order = np.argsort(angle, axis=1)
     angle = np.take_along_axis(angle, order, axis=1)
-    count = same.sum(axis=1)
-    every = np.arange(n)
     last = np.maximum(count - 1, 0)
     following = np.concatenate([angle[:, 1:], angle[:, :1]], axis=1)
     following[every, last] = angle[:, 0] + 2 * np.pi
@@ -107,24 +127,8 @@ def _find_rims(part, cloud, bend, bridge):
     widest = width.argmax(axis=1)
     width = width[every, widest]
     start = np.where(count > 0, angle[every, widest], 0.0)
-
-    bounding = np.stack([order[every, widest], order[every, np.where(widest == last, 0, widest + 1) % k]], axis=1)
-    ends = np.stack([np.take_along_axis(x, bounding, axis=1), np.take_along_axis(y, bounding, axis=1)], axis=2)
-    middle = start + width / 2
-    outward = np.einsum("na,nai->ni", np.stack([np.cos(middle), np.sin(middle)], axis=1), frames)
-    gap = (width > GAP) & (count > 0)
-    distance = np.full(n, np.inf)
-    rows = np.flatnonzero(gap)
-    distance[rows], other = across_gaps(part.start + rows, outward[rows], cloud, bridge, bend=bend)
-    bridged = np.isfinite(distance)
-    rows, other = rows[bridged[rows]], other[bridged[rows]]
-    bridged[rows] = ~walled(part.start + rows, other, cloud)
-    reach = np.zeros(n)
-    reach[bridged] = bridged_reach(distance[bridged], spacing[bridged])
-    ends = np.einsum("nea,nai->nei", ends, frames)
-    beside = np.take_along_axis(neighbours, bounding, axis=1)
-    margin = np.repeat(RIM * spacing[:, None], 3, axis=1)
-    return Rims(gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, np.zeros(n), crease, limit)
+    after = np.where(widest == last, 0, widest + 1) % place.shape[1]
+    return width, start + width / 2, np.stack([order[every, widest], order[every, after]], axis=1)
 
 
 def one_sheet(step, normals, other_normals) -> np.ndarray:
