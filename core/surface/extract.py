@@ -19,7 +19,7 @@ from .edges.meetings import Meetings, find_meetings
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
 from .meshing.misfit import askew, distances
-from .meshing.pieces import pieces_touch, without_small_pieces
+from .meshing.pieces import pieces_touch, pieces_with_samples, without_small_pieces
 from .signed import signed_distance, signed_mesh
 from .signs.sides import Sides, find_sides, may_be_closed, needed_band
 from .single.single_layer import sheet_of_crossings, sheet_of_sides
@@ -128,9 +128,11 @@ class _Layers:
 
     @cached_property
     def cover(self) -> Mesh:
-        """The double cover: both sides of the single layer, where these are the whole surface."""
+        """The double cover: both sides of the single layer, where these are the whole surface; without the pockets of a
+        few faces that may be left along the lines where sheets meet."""
         if self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1:
-            return both_sides(self.single[0], self.grid.spacing)
+            cover = both_sides(self.single[0], self.grid.spacing)
+            return cover if self.sheet is not None else pieces_with_samples(cover, self.local.tree, self.grid.spacing)
         return self.extracted
 
     @cached_property

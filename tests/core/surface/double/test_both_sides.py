@@ -338,3 +338,22 @@ def is_of_sheet(run):
     places = np.concatenate([run.sheet.vertices, middles])
     apart = KDTree(places).query(run.surface.vertices)[0] / run.field.spacing
     return apart.max() <= 0.5 * HAIR + 1e-9
+
+
+def test_a_run_leaves_out_pockets_of_a_few_faces_beside_the_sheet(monkeypatch):
+    """A closed scrap of six faces, whose inside and outside would be pieces of their own."""
+    found = extract.sheet_of_crossings
+    points, settings = shapes.junction(2000), Settings(resolution=48)
+
+    def with_pocket(values, band, crossings, surface, grid, *rest):
+        mesh, unoriented = found(values, band, crossings, surface, grid, *rest)
+        corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0.5], [0.3, 0.3, -0.5]]) * 0.5 * grid.spacing
+        faces = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]]) + len(mesh.vertices)
+        vertices = np.concatenate([mesh.vertices, corners + surface.points[0]])
+        return replace(mesh, vertices=vertices, faces=np.concatenate([mesh.faces, faces.astype(np.int32)])), unoriented
+
+    clean = reconstruct(points, settings).surface
+    monkeypatch.setattr(extract, "sheet_of_crossings", with_pocket)
+    scrapped = reconstruct(points, settings).surface
+    assert len(shapes.components(scrapped)) == len(shapes.components(clean)) == 1
+    assert len(scrapped.faces) == len(clean.faces)
