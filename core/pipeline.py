@@ -80,7 +80,8 @@ def _reconstruct(points, settings, constraints, normals, progress):
             samples, cleaning = clean(samples, settings, progress.part(0.01, 0.09, "cleaning"))
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
         spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
-        rounded = rounding_warning(unmoved, float(np.median(spacing)) * samples.scale)
+        typical = float(np.median(spacing)) * samples.scale
+        rounded = rounding_warning(unmoved, typical)
         del unmoved
         grid = fit_grid(samples.points, settings.resolution)
         estimate = estimate_cost(spacing, grid, settings, noisy="noisy" in cleaning)
@@ -121,18 +122,11 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "normals": solved,
         "meshes": mesh_facts(surfaces, progress.part(0.99, 1.0, "report")),
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
-        "spacing": float(np.median(spacing)) * samples.scale,
+        "spacing": typical,
         "seconds": stages.seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
-        "warnings": [
-            *samples.warnings,
-            *rounded,
-            *ignored,
-            *large,
-            *_too_coarse(spacing, grid),
-            *surfaces.warnings,
-        ],
+        "warnings": [*samples.warnings, *rounded, *ignored, *large, *_too_coarse(local, grid), *surfaces.warnings],
     }
     progress.part(0.0, 1.0, "report")(1.0)
     row = samples.given_order()
@@ -149,8 +143,8 @@ def _reconstruct(points, settings, constraints, normals, progress):
     )
 
 
-def _too_coarse(spacing, grid):
-    cells = float(np.median(spacing)) / grid.spacing
+def _too_coarse(local, grid):
+    cells = local.spacing_in_cells(grid)
     if cells >= _COARSE:
         return ()
     return (
