@@ -31,7 +31,6 @@ _OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples th
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
-_THROUGH = 0.125  # of those, at least: sheets that pass through each other
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
 _SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
@@ -149,7 +148,7 @@ class _Layers:
             return False
         if self.meetings.share <= _FEW:
             return True
-        if self.meetings.through >= _THROUGH:
+        if self.meetings.pass_through:
             return False
         return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
@@ -227,7 +226,8 @@ def extract_surfaces(
             )
     if kind == "signed":
         values = signed_distance(values, layers.sides, local, place)
-        meshes["signed"] = signed_mesh(values, local, grid, progress.part(0.6, 1.0, "signed surface"))
+        part = progress.part(0.6, 1.0, "signed surface")
+        meshes["signed"] = signed_mesh(values, layers.meetings.passing, local, grid, part)
         if not layers.sides.complete:
             warnings.append(
                 f"{layers.sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "

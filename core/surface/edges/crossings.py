@@ -46,7 +46,7 @@ class Crossings:
     node  : (e,) int64, flat index of the edge's lower node     axis : (e,) int64, its direction
     place : (e,3) float64, where, on the surface                cells : (c,) int64, ascending, cells near the surface
     normal : (e,3) float64, of the sheet, where sheets meet; zero elsewhere
-    side_by_side : bool, whether sheets run side by side
+    meetings : Meetings of its sheets
     """
 
     node: np.ndarray
@@ -54,7 +54,7 @@ class Crossings:
     place: np.ndarray
     cells: np.ndarray
     normal: np.ndarray
-    side_by_side: bool = False
+    meetings: Meetings
 
     def cells_around(self, grid: Grid) -> np.ndarray:
         """The four cells around each edge in cyclic order, by their lowest nodes, (e,4)."""
@@ -102,7 +102,7 @@ def find_crossings(
         np.concatenate([place[crossed], meet.place[twice]]),
         band.node[lowest],
         np.concatenate([normal[crossed], meet.normal[twice]]),
-        meetings.side_by_side,
+        meetings,
     )
 
 

@@ -26,7 +26,10 @@ _PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 _WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
-_BESIDE = 0.05  # of the samples at meetings, more beside another sheet are no chance
+_THROUGH = 0.125  # of the samples at meetings, as many of sheets that pass through one another are no chance
+_LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all these, at least
+_PASSING = 24  # samples around one, with such a sample among which it is close to the line
+_BESIDE = 0.05  # the same of samples beside another sheet
 
 
 @dataclass(frozen=True)
@@ -34,13 +37,15 @@ class Meetings:
     """Samples in whose neighbourhood there are several sheets.
 
     at      : (n,) bool
-    through : float, as a share of those, the samples of sheets that pass through one another
-    beside  : float, as a share of those, the ones of them with another sheet that runs side by side with theirs
+    through : (n,) bool, those of them whose sheet passes through another one
+    beside  : (n,) bool, those of them with another sheet that runs side by side with theirs
+    passing : (n,) bool, all samples close to lines along which sheets pass through one another
     """
 
     at: np.ndarray
-    through: float
-    beside: float
+    through: np.ndarray
+    beside: np.ndarray
+    passing: np.ndarray
 
     @property
     def share(self) -> float:
@@ -48,9 +53,17 @@ class Meetings:
         return float(self.at.mean())
 
     @property
+    def pass_through(self) -> bool:
+        """Whether sheets pass through one another, and do not only look like that by chance."""
+        return self._share(self.through) >= _THROUGH
+
+    @property
     def side_by_side(self) -> bool:
         """Whether sheets run so close beside each other that single layers are torn there."""
-        return self.beside > _BESIDE
+        return self._share(self.beside) > _BESIDE
+
+    def _share(self, some):
+        return some.sum() / max(self.at.sum(), 1)
 
 
 def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
@@ -63,7 +76,7 @@ def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
     i, at = np.nonzero(unlike)
     j = nearest[i, at]
     if not len(i):
-        return Meetings(np.zeros(n, bool), 0.0, 0.0)
+        return Meetings(*np.zeros((4, n), bool))
     apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
     cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
     askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
@@ -74,7 +87,7 @@ def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
     through = _among(n, i[askew][past == 2], j[askew][past == 2])
     side_by_side = apart & (cosine > _SIDE_BY_SIDE)
     beside = at & _among(n, i[side_by_side], j[side_by_side])
-    return Meetings(at, *(float(some.sum() / max(at.sum(), 1)) for some in (through, beside)))
+    return Meetings(at, at & through, beside, _of_lines(through, nearest)[nearest[:, :_PASSING]].any(axis=1))
 
 
 def _among(n, *rows):
@@ -93,6 +106,18 @@ def _grown(sure, weak, nearest):
     graph = coo_matrix((np.ones(len(row), bool), (of[row], beside[row, column])), shape=(n, n))
     part = connected_components(graph, directed=False)[1]
     return weak & np.isin(part, part[sure])
+
+
+def _of_lines(through, nearest):
+    """Which of the samples of sheets that pass `through` one another, (n,) bool, show a line: where many are connected,
+    and they are many of those around. At tight bends and thin parts some samples look like that by chance."""
+    n, of = len(nearest), np.flatnonzero(through)
+    row, column = np.nonzero(through[nearest[of]])
+    graph = coo_matrix((np.ones(len(row), bool), (of[row], nearest[of[row], column])), shape=(n, n))
+    part = connected_components(graph, directed=False)[1].astype(np.int64)
+    around = np.unique(part[of, None] * n + nearest[of, : 1 + _AROUND]) // n
+    count = np.bincount(part[of], minlength=n)
+    return through & ((count >= _LINE) & (count >= _DENSE * np.bincount(around, minlength=n)))[part]
 
 
 def _linked(i, j, nearest, alike, sure):

@@ -25,14 +25,14 @@ _ROUNDS = 4
 
 
 def into_corners(
-    vertices, faces, side, surface: LocalSurface, cell: float, progress=None, farthest: float = _FARTHEST
+    vertices, faces, side, surface: LocalSurface, cell: float, progress=None, farthest=_FARTHEST
 ) -> np.ndarray:
     """Vertices (v,3) of triangles or quads (f,k), each on a foot point, with one end of every edge that cuts a concave
     corner taken to where the planes of the sheets meet.
 
     side     : (v,3) float64, unit normals of the surface at the foot points, towards the side that the faces are on;
                zero where there is none, past a rim
-    farthest : cells, how far a vertex may go
+    farthest : cells, how far vertices may go, or (v,) how far each
 
     The iso-surface is an offset away from all sheets, so next to a corner no vertex falls into it. Ends that are closer
     to the corner go first. They stay where that would take them far or off the surface, between sheets that run close
@@ -51,7 +51,7 @@ def into_corners(
         vertices[row], side[row], np.append(low, high), np.append(high, low), surface, cell, progress
     )
     length = np.linalg.norm(step, axis=1)
-    length[(length > farthest * cell) | (off > _APART * cell)] = np.inf
+    length[(length > cell * np.broadcast_to(farthest, len(vertices))[row]) | (off > _APART * cell)] = np.inf
     chosen = _closest_ends(low, high, length)
     moved = vertices.copy()
     moved[row[chosen]] += step[chosen]

@@ -1,4 +1,9 @@
-"""Parts of a closed shape that the signs of nodes do not show: too thin for one to lie inside, and slits as narrow."""
+"""Parts of a surface that the signs of nodes do not show: too thin for one to lie inside, slits as narrow, and lines
+along which sheets pass through one another.
+
+Of the four wedges around such a line two are inside. Whether they hang together there is told by single nodes, now so
+and now so; lifted, the mesh has none of the handles that this would make, and each wedge its own edge.
+"""
 
 from dataclasses import dataclass
 
@@ -14,6 +19,7 @@ from ...progress import Progress
 
 _REACH = 1.25  # cells; where either side is thick, one of its nodes is as close to any sample
 _LEVEL = 0.8  # cells off the surface that the iso-surface is taken there
+_PARTED = 0.6  # cells, the same along lines
 _FULL, _END = 1.5, 4.0  # cells from such a sample, where it is taken as far off, and where no further
 _BETWEEN = 1.0  # cells, over which it comes back from the samples of slits to those with nodes on both sides
 _NEAR = 2.0  # cells from the surface, farther values do not matter for the mesh
@@ -22,22 +28,26 @@ _CHUNK = 1 << 12  # samples
 
 @dataclass(frozen=True)
 class ThinParts:
-    """Samples (t,3) with no node inside near them, `thin`, with none outside, `slits`, and with both, `clear`."""
+    """Samples (t,3) with no node inside near them, `thin`, with none outside, `slits`, close to `lines` along which
+    sheets pass through one another, and `clear` ones, which are none of these."""
 
     thin: np.ndarray
     slits: np.ndarray
+    lines: np.ndarray
     clear: np.ndarray
     cell: float
 
     def lift(self, x: np.ndarray) -> np.ndarray:
         """How far outside of the surface the iso-surface is taken at x (m,3), (m,), units of the samples: 0.8 cells at
-        thin parts, as far inside of it at slits. Slits give way to clear samples: close to an outer wall that were
-        lifted as well, they would merge with the outside, and the wall be lost."""
-        thin, slit = (self._away(samples, x) for samples in (self.thin, self.slits))
-        share, near = _falling(thin), np.flatnonzero(slit < _END)
-        nearer = self._away(self.clear, x[near]) - slit[near]
-        share[near] -= _falling(slit[near]) * np.clip(0.5 + nearer / _BETWEEN, 0.0, 1.0)
-        return _LEVEL * self.cell * share
+        thin parts, as far inside of it at slits, and 0.6 along lines. Slits and lines give way to clear samples: close
+        to an outer wall that were lifted as well, slits would merge with the outside, and the wall be lost."""
+        thin, slit, line = (self._away(samples, x) for samples in (self.thin, self.slits, self.lines))
+        lift, near = _LEVEL * _falling(thin), np.flatnonzero(np.minimum(slit, line) < _END)
+        slit, line = slit[near], line[near]
+        nearer = self._away(self.clear, x[near]) - np.minimum(slit, line)
+        inside = np.maximum(_LEVEL * _falling(slit), _PARTED * _falling(line))
+        lift[near] -= inside * np.clip(0.5 + nearer / _BETWEEN, 0.0, 1.0)
+        return self.cell * lift
 
     def _away(self, samples, x):
         """Cells from x (m,3) to the nearest of the samples, (m,); at most as far as lifts reach."""
@@ -51,8 +61,9 @@ class ThinParts:
         if not len(places):
             return self
         tree, end = KDTree(places), _END * self.cell
-        thin, slits = (x[tree.query(x, distance_upper_bound=end)[0] > end] for x in (self.thin, self.slits))
-        return ThinParts(thin, slits, self.clear, self.cell) if len(thin) + len(slits) else None
+        lifted = self.thin, self.slits, self.lines
+        left = [x[tree.query(x, distance_upper_bound=end)[0] > end] for x in lifted]
+        return ThinParts(*left, self.clear, self.cell) if sum(map(len, left)) else None
 
     def lower(self, values: np.ndarray | Blocks, grid: Grid) -> None:
         """Take the lift off signed distances (nx,ny,nz) float32 or Blocks, in place, where the surface is near."""
@@ -66,9 +77,11 @@ def _falling(away):
     return np.clip((_END - away) / (_END - _FULL), 0.0, 1.0)
 
 
-def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Grid, progress=None) -> ThinParts | None:
+def find_thin_parts(
+    values: np.ndarray | Blocks, passing: np.ndarray, surface: LocalSurface, grid: Grid, progress=None
+) -> ThinParts | None:
     """Where samples have nodes within 1.25 cells on one side alone, by signed distances `values`, (nx,ny,nz) float32 or
-    Blocks; None where all have both."""
+    Blocks, and those close to lines, `passing` (n,) bool; None where all have both and none is."""
 
     def one_sided(part):
         node, squared = _nodes_around(surface.points[part], grid, int(np.ceil(_REACH - 0.5)))
@@ -77,9 +90,11 @@ def find_thin_parts(values: np.ndarray | Blocks, surface: LocalSurface, grid: Gr
 
     chunks = Progress.of(progress).chunks(len(surface.points), _CHUNK)
     thin, slit = np.concatenate([found for _, found in in_order(one_sided, chunks)], axis=1)
-    if not (thin | slit).any():
+    clear = ~(thin | slit | passing)
+    if clear.all():
         return None
-    return ThinParts(*(surface.points[chosen] for chosen in (thin, slit, ~(thin | slit))), grid.spacing)
+    kinds = thin & ~passing, slit & ~passing, passing, clear
+    return ThinParts(*(surface.points[chosen] for chosen in kinds), grid.spacing)
 
 
 def _nodes_around(points, grid, half):

@@ -16,7 +16,7 @@ from ..meshing.isosurface import isosurface
 from .thin_parts import ThinParts
 
 _ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
-_INTO = 1.5  # cells, how far a vertex may go into a crease
+_INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, and to a line where sheets pass through
 
 
 def zero_set(
@@ -44,12 +44,18 @@ def zero_set(
     return vertices, faces
 
 
-def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
+def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
     """The mesh, whose vertices lie on the surface, with those next to creases taken into them: inward ones, then
-    outward ones, which are inward seen from inside."""
+    outward ones, which are inward seen from inside. Wedges along lines where sheets pass through one another are
+    outward creases; they start far from their edge, and are looked at once more.
+
+    passing : (n,) bool, the samples close to such lines
+    """
     vertices = mesh.vertices
-    for turn, outward in enumerate((1.0, -1.0)):
-        part = progress.part(turn / 2, (turn + 1) / 2)
+    turns = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
+    farthest = _farthest(vertices, passing, surface)
+    for turn, outward in enumerate(turns):
+        part = progress.part(turn / len(turns), (turn + 1) / len(turns))
         normal, least = vertex_normals(vertices, mesh.faces)
         beside_bends, side = np.zeros(len(vertices), bool), np.zeros_like(vertices)
         beside_bends[mesh.faces[(least < FLAT)[mesh.faces].any(axis=1)]] = True
@@ -61,5 +67,12 @@ def sharpened(mesh: Mesh, surface: LocalSurface, cell: float, progress: Progress
         side[row[clear]] = direction[clear]
         known = side.any(axis=1)
         beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
-        vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), _INTO)
+        vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), farthest)
     return replace(mesh, vertices=vertices)
+
+
+def _farthest(vertices, passing, surface):
+    """How many cells each vertex may go into a crease, (v,), or where no sheets pass through one another, all."""
+    if not passing.any():
+        return _INTO
+    return np.where(passing[surface.tree.query(vertices, workers=-1)[1]], _INTO_LINES, _INTO)

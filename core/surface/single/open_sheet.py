@@ -24,12 +24,22 @@ _COVERED = 0.4  # cells, a face whose middle is this close to the surface is on 
 _FAR = 1.0  # cells, that faces past a rim reach off the surface; those in cracks and along creases do not
 
 
-def open_sheet(values: np.ndarray | Blocks, band: NearBand, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
+def open_sheet(
+    values: np.ndarray | Blocks,
+    band: NearBand,
+    passing: np.ndarray,
+    surface: LocalSurface,
+    grid: Grid,
+    progress=None,
+) -> Mesh:
     """The zero set of signed distances (nx,ny,nz) float32 or Blocks near the surface, which :func:`two_sided` gives and
     which may be changed, on its foot points and without what is past its rims: two faces at each edge or one, wound
-    alike, with ragged borders."""
+    alike, with ragged borders.
+
+    passing : (n,) bool, the samples close to lines along which sheets pass through one another, see :class:`ThinParts`
+    """
     progress, cell = Progress.of(progress), grid.spacing
-    thin = find_thin_parts(values, surface, grid, progress.part(0.0, 0.1))
+    thin = find_thin_parts(values, passing, surface, grid, progress.part(0.0, 0.1))
     if thin:  # past a rim distances are those to the sheet continued, which is no place to lift it
         thin = thin.away_from(grid.positions(band.node[band.past_rim]))
     vertices, faces = zero_set(values, thin, surface, grid, progress.part(0.1, 0.2), _NEAR * cell)

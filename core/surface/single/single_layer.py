@@ -53,16 +53,16 @@ def sheet_of_sides(
 
     values : (nx,ny,nz) float32 or Blocks, unsigned distances     band : the nodes near the surface
     """
-    progress = Progress.of(progress)
+    progress, passing = Progress.of(progress), crossings.meetings.passing
     if sides.complete:
-        return signed_mesh(sides.sign(values), surface, grid, progress)
+        return signed_mesh(sides.sign(values), passing, surface, grid, progress)
     if crossings.normal.any():
         return None
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.2))
     if signed is None:
         return None
-    found = open_sheet(signed, band, surface, grid, progress.part(0.2, 0.8))
-    sheet, unoriented = _finished(found, surface, grid, progress.part(0.8, 1.0))
+    found = open_sheet(signed, band, passing, surface, grid, progress.part(0.2, 0.8))
+    sheet, unoriented = _finished(found, passing, surface, grid, progress.part(0.8, 1.0))
     return None if unoriented or (sheet.edge_counts()[1] > 2).any() else sheet
 
 
@@ -87,22 +87,23 @@ def sheet_of_crossings(
 
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
-    progress = Progress.of(progress)
+    progress, meetings = Progress.of(progress), crossings.meetings
+    passing = meetings.passing
     found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
-    sheet, unoriented = _finished(found, surface, grid, progress.part(0.3, 0.5))
+    sheet, unoriented = _finished(found, passing, surface, grid, progress.part(0.3, 0.5))
     if not crossings.normal.any():
         return sheet, unoriented
     lines = _lines(sheet)
-    chance = not (unoriented or crossings.side_by_side) and _are_short(lines, grid)
+    chance = not (unoriented or meetings.side_by_side) and _are_short(lines, grid)
     if not (unoriented or chance):
         return sheet, unoriented
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
     if signed is None:
         return sheet, unoriented
-    if crossings.side_by_side:
-        return _finished(one_side(cover(), signed, surface, grid), surface, grid, Progress())
-    found = open_sheet(signed, band, surface, grid, progress.part(0.6, 0.9))
-    found, left = _finished(found, surface, grid, progress.part(0.9, 1.0))
+    if meetings.side_by_side:
+        return _finished(one_side(cover(), signed, surface, grid), passing, surface, grid, Progress())
+    found = open_sheet(signed, band, passing, surface, grid, progress.part(0.6, 0.9))
+    found, left = _finished(found, passing, surface, grid, progress.part(0.9, 1.0))
     parted = _borders_beside(lines, found, grid.spacing)
     replaces = not (left or parted or len(_lines(found))) if chance else parted <= _BORDERED * len(lines)
     return (found, left) if replaces else (sheet, unoriented)
@@ -129,12 +130,12 @@ def _borders_beside(lines, sheet, cell):
     return int((KDTree(lines.mean(axis=1)).query(border)[0] < _BESIDE * cell).sum())
 
 
-def _finished(mesh, surface, grid, progress):
+def _finished(mesh, passing, surface, grid, progress):
     """A sheet mended, wound alike, and sharp where sheets meet or fold, and the number of edges across which it is not
     wound alike."""
     sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
     sheet = onto_junctions(sheet, surface, grid.spacing, progress.part(0.0, 0.5))
-    return centred(sharpened(sheet, surface, grid.spacing, progress.part(0.5, 1.0))), unoriented
+    return centred(sharpened(sheet, passing, surface, grid.spacing, progress.part(0.5, 1.0))), unoriented
 
 
 def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:

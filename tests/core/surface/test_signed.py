@@ -133,7 +133,7 @@ def test_a_spanned_opening_is_smooth():
     values = (np.sign(radius - 1) * away).reshape(grid.shape).astype(np.float32)
     surface = fit_local_surface(points, points / np.linalg.norm(points, axis=1, keepdims=True), np.ones(len(points)),
                                 local_spacing(points), 3.0)  # fmt: skip
-    mesh = signed_mesh(values, surface, grid)
+    mesh = signed_mesh(values, np.zeros(len(points), bool), surface, grid)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     cap = (a[:, 2] > 0.75) & (np.hypot(a[:, 0], a[:, 1]) < 0.4)
@@ -197,14 +197,14 @@ def test_creases_are_sharpened_by_the_faces_beside_them(monkeypatch):
     surface, grid = fit_local_surface(points, normals, confidence, spacing, 3.0), fit_grid(points, 32)
     mesh = signed(points, resolution=32).surface
     blunt = replace(mesh, vertices=mesh.vertices * (1 - 0.3 * grid.spacing * np.abs(mesh.vertices)))
-    found = sharpened(blunt, surface, grid.spacing, Progress())
+    found = sharpened(blunt, np.zeros(len(points), bool), surface, grid.spacing, Progress())
 
     def by_all(vertices, faces, *rest):
         seen.append(len(faces))
         return into_corners(vertices, blunt.faces, *rest)
 
     monkeypatch.setattr("core.surface.signs.zero_set.into_corners", by_all)
-    expected = sharpened(blunt, surface, grid.spacing, Progress())
+    expected = sharpened(blunt, np.zeros(len(points), bool), surface, grid.spacing, Progress())
     assert 0 < max(seen) < 0.5 * len(blunt.faces)
     assert np.linalg.norm(found.vertices - blunt.vertices, axis=1).max() > 0.1 * grid.spacing
     np.testing.assert_array_equal(found.vertices, expected.vertices)

@@ -9,9 +9,11 @@ from core.field.integration import BAND, distance_field
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.edges.crossings import _HAIR, Crossings, _beside, _in_whole_cells, _may_be_covered, find_crossings
+from core.surface.edges.meetings import Meetings
 from tests import shapes
 from tests.bands import near_band
 
+NO_MEETINGS = Meetings(*np.zeros((4, 0), bool))
 GRID = Grid(np.array([-1.31, -1.29, -1.33]), 0.1, (28, 27, 28))
 
 
@@ -94,8 +96,8 @@ def test_cells_around_an_edge_share_it():
     strides = node_strides(GRID.shape)
     assert strides.tolist() == [27 * 28, 28, 1]
     node = np.full(3, strides @ [5, 6, 7])
-    cells = Crossings(node, np.arange(3), np.zeros((3, 3)), np.empty(0, int), np.zeros((3, 3))).cells_around(GRID)
-    for axis, around in enumerate(cells):
+    crossings = Crossings(node, np.arange(3), np.zeros((3, 3)), np.empty(0, int), np.zeros((3, 3)), NO_MEETINGS)
+    for axis, around in enumerate(crossings.cells_around(GRID)):
         corners = np.stack(np.unravel_index(around, GRID.shape), axis=1) - [5, 6, 7]
         assert set(corners[:, axis]) == {0}
         assert sorted(map(tuple, np.delete(corners, axis, axis=1))) == [(-1, -1), (-1, 0), (0, -1), (0, 0)]
@@ -142,7 +144,7 @@ def test_stops_when_told(sphere):
 
 def test_an_edge_crossed_twice_changes_no_side():
     node, axis = np.array([500, 500, 500, 501]), np.array([0, 0, 1, 0])
-    crossings = Crossings(node, axis, np.zeros((4, 3)), np.empty(0, int), np.zeros((4, 3)))
+    crossings = Crossings(node, axis, np.zeros((4, 3)), np.empty(0, int), np.zeros((4, 3)), NO_MEETINGS)
     assert crossings.changing_sides.tolist() == [1501, 1503]
 
 

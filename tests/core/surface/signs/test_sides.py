@@ -8,9 +8,11 @@ from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.progress import Progress
 from core.surface.edges.crossings import Crossings
+from core.surface.edges.meetings import Meetings
 from core.surface.signs.sides import Sides, _numbered, _sides, find_sides, may_be_closed, patch_lengths
 from tests import shapes
 
+NO_MEETINGS = Meetings(*np.zeros((4, 0), bool))
 GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
 RADIUS = np.linalg.norm(GRID.positions(np.arange(29**3)), axis=1).reshape(GRID.shape)
 
@@ -29,12 +31,12 @@ def crossings_of(inside):
         node.append(np.delete(flat, -1, axis=a)[change])
         axis.append(np.full(change.sum(), a))
     node, axis = np.concatenate(node), np.concatenate(axis)
-    return Crossings(node, axis, GRID.positions(node), np.empty(0, int), np.zeros((len(node), 3)))
+    return Crossings(node, axis, GRID.positions(node), np.empty(0, int), np.zeros((len(node), 3)), NO_MEETINGS)
 
 
 def without(crossings, dropped):
     kept = (array[~dropped] for array in (crossings.node, crossings.axis, crossings.place))
-    return Crossings(*kept, crossings.cells, crossings.normal[~dropped])
+    return Crossings(*kept, crossings.cells, crossings.normal[~dropped], NO_MEETINGS)
 
 
 @pytest.mark.parametrize(
@@ -92,6 +94,7 @@ def test_an_inner_wall_has_the_inside_on_both_faces(surface):
         np.concatenate([crossings.place, GRID.positions(wall)]),
         crossings.cells,
         np.zeros((len(crossings.node) + len(wall), 3)),
+        NO_MEETINGS,
     )
     z = GRID.origin[2] + GRID.spacing * np.arange(29)
     distance = np.minimum(np.abs(RADIUS - 1), np.hypot(z - 0.04, np.maximum(RADIUS - 1, 0)))
@@ -117,6 +120,7 @@ def ball_and_square(share):
         np.zeros((len(around.node) + len(above), 3)),
         around.cells,
         np.zeros((len(around.node) + len(above), 3)),
+        NO_MEETINGS,
     )
     place = np.random.default_rng(0).uniform([-0.8, -0.8, 0.96], [0.8, 0.8, 0.96], (count, 3))
     out = shapes.sphere(1000 - count)

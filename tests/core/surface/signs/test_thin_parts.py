@@ -12,6 +12,8 @@ from core.surface.meshing.misfit import distances
 from core.surface.signs.thin_parts import ThinParts, find_thin_parts
 from tests import shapes
 
+NONE, NOWHERE = np.empty((0, 3)), np.zeros(1000, bool)
+
 
 def tailed_ball(radius):
     """A ball of radius 1 with a tail of length .8, open where it starts."""
@@ -47,8 +49,8 @@ def ball():
 
 def test_a_thick_shape_has_none(ball):
     surface, grid, values = ball
-    assert find_thin_parts(values, surface, grid) is None
-    assert find_thin_parts(-values, surface, grid) is None
+    assert find_thin_parts(values, NOWHERE, surface, grid) is None
+    assert find_thin_parts(-values, NOWHERE, surface, grid) is None
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -57,7 +59,7 @@ def test_samples_with_one_side_alone_are_found_and_the_surface_is_lifted_there(b
     surface, grid, values = ball
     high = grid.positions(np.arange(values.size))[:, 2].reshape(values.shape) > 0.3
     values = sign * np.where(high, np.abs(values), values)
-    parts = find_thin_parts(values, surface, grid)
+    parts = find_thin_parts(values, NOWHERE, surface, grid)
     samples, others = (parts.thin, parts.slits)[::sign]
     assert len(others) == 0
     above = surface.points[:, 2] > 0.3 + 2 * grid.spacing
@@ -66,14 +68,14 @@ def test_samples_with_one_side_alone_are_found_and_the_surface_is_lifted_there(b
     np.testing.assert_allclose(parts.lift(samples), sign * 0.8 * grid.spacing)
     away = np.array([0, 0, 1]) * (np.array([[0], [1.5], [2.75], [4], [9]]) * grid.spacing)
     top = samples[samples[:, 2].argmax()]
-    one = ThinParts(*(top[None], samples[:0])[::sign], samples[:0], grid.spacing)
+    one = ThinParts(*(top[None], NONE)[::sign], NONE, NONE, grid.spacing)
     np.testing.assert_allclose(one.lift(top + away) / grid.spacing, sign * np.array([0.8, 0.8, 0.4, 0, 0]), atol=1e-9)
 
 
 def test_values_are_lowered_near_the_surface_alone(ball):
     surface, grid, values = ball
     given = np.abs(values)
-    parts, lifted = find_thin_parts(given, surface, grid), given.copy()
+    parts, lifted = find_thin_parts(given, NOWHERE, surface, grid), given.copy()
     parts.lower(lifted, grid)
     near = given <= 2 * grid.spacing
     np.testing.assert_array_equal(lifted[~near], given[~near])
@@ -81,12 +83,38 @@ def test_values_are_lowered_near_the_surface_alone(ball):
     np.testing.assert_allclose(lifted[near], given[near] - parts.lift(at), atol=1e-6)
 
 
-def test_slits_give_way_to_clear_samples_and_thin_parts_do_not():
+def test_samples_close_to_lines_count_as_that_alone(ball):
+    surface, grid, values = ball
+    high = grid.positions(np.arange(values.size))[:, 2].reshape(values.shape) > 0.3
+    passing = surface.points[:, 0] > 0
+    for sign in (1, -1):
+        given = sign * np.where(high, np.abs(values), values)
+        alone, parts = (find_thin_parts(given, some, surface, grid) for some in (NOWHERE, passing))
+        np.testing.assert_array_equal(parts.lines, surface.points[passing])
+        for name in ("thin", "slits", "clear"):
+            others = getattr(alone, name)
+            np.testing.assert_array_equal(getattr(parts, name), others[others[:, 0] <= 0])
+
+
+def test_slits_and_lines_give_way_to_clear_samples_and_thin_parts_do_not():
     """Over a cell, from where they are half a cell nearer to where these are."""
     at = np.array([[0.0, 0, 0], [0.75, 0, 0], [1, 0, 0], [1.25, 0, 0], [2, 0, 0]])
-    none, here, clear = np.empty((0, 3)), at[:1], at[-1:]
-    np.testing.assert_allclose(ThinParts(none, here, clear, 1.0).lift(at), -0.8 * np.array([1, 1, 0.5, 0, 0]))
-    np.testing.assert_allclose(ThinParts(here, none, clear, 1.0).lift(at), 0.8 * np.array([1, 1, 1, 1, 0.8]))
+    here, clear, falling = at[:1], at[-1:], np.array([1, 1, 0.5, 0, 0])
+    np.testing.assert_allclose(ThinParts(NONE, here, NONE, clear, 1.0).lift(at), -0.8 * falling)
+    np.testing.assert_allclose(ThinParts(NONE, NONE, here, clear, 1.0).lift(at), -0.6 * falling)
+    np.testing.assert_allclose(ThinParts(NONE, here, here, clear, 1.0).lift(at), -0.8 * falling)
+    np.testing.assert_allclose(ThinParts(here, NONE, NONE, clear, 1.0).lift(at), 0.8 * np.array([1, 1, 1, 1, 0.8]))
+
+
+@pytest.mark.parametrize("surface", ["single", "signed"])
+def test_balls_that_pass_through_each_other_have_no_handles_along_their_line(surface):
+    """The two parts of one ball alone hung together by 14 handles, and more on other grids."""
+    ball, turn = shapes.sphere(2500), shapes.random_rotation(1)
+    run = reconstruct(np.concatenate([ball, ball @ turn.T + [1.1, 0.1, 0.2]]) @ turn, Settings(64, surface=surface))
+    mesh = run.sheet if surface == "single" else run.surface
+    assert [shapes.euler(piece) for piece in shapes.components(mesh)] == [2, 2]
+    assert set(mesh.edge_counts()[1]) == {2}
+    assert distances(mesh, run.points).max() < 0.5 * run.field.spacing
 
 
 def test_a_wall_is_kept_with_something_thinner_than_a_cell_right_behind_it():
@@ -125,9 +153,10 @@ def test_a_slit_narrower_than_a_cell_is_kept():
 
 
 def test_thin_parts_away_from_places_are_left():
-    parts = ThinParts(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[0.0, 9, 0]]), np.empty((0, 3)), 1.0)
+    parts = ThinParts(np.array([[0.0, 0, 0], [9, 0, 0]]), np.array([[0.0, 9, 0]]), np.array([[0.0, 0, 9]]), NONE, 1.0)
     assert parts.away_from(np.empty((0, 3))) is parts
-    left = parts.away_from(np.array([[3.9, 0, 0], [0, 9, 4.1]]))
+    left = parts.away_from(np.array([[3.9, 0, 0], [0, 9, 4.1], [0, 0, 13.1]]))
     np.testing.assert_array_equal(left.thin, [[9, 0, 0]])
     np.testing.assert_array_equal(left.slits, [[0, 9, 0]])
-    assert parts.away_from(np.array([[0, 0, 1.0], [9, 0, 1], [0, 9, 1]])) is None
+    np.testing.assert_array_equal(left.lines, [[0, 0, 9]])
+    assert parts.away_from(np.array([[0, 0, 1.0], [9, 0, 1], [0, 9, 1], [0, 0, 8]])) is None

@@ -1,5 +1,7 @@
 """The two sides of open surfaces, by closed form, by a dense eigenvector and on surfaces that have none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -110,9 +112,7 @@ def test_wrong_votes_are_overruled(asked):
     seen = asked(bowl())
     crossings, random = seen["crossings"], np.random.default_rng(0)
     kept = random.random(len(crossings.node)) > 0.03
-    fewer = type(crossings)(
-        crossings.node[kept], crossings.axis[kept], crossings.place[kept], crossings.cells, crossings.normal[kept]
-    )
+    fewer = replace(crossings, **{name: getattr(crossings, name)[kept] for name in ("node", "axis", "place", "normal")})
     given = seen["values"], seen["band"], fewer, seen["surface"], seen["grid"], Progress()
     signed = two_sided(*given).reshape(-1)[seen["band"].node]
     before = seen["signed"].reshape(-1)[seen["band"].node]
