@@ -2,7 +2,9 @@
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
+
+from ...linalg import symmetric
 
 
 def spread_signs(links: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
@@ -23,3 +25,13 @@ def spread_signs(links: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
     while (above < n).any():  # each looks twice as far up as before
         sign, above = sign * sign[above], above[above]
     return sign[:n], part
+
+
+def spread_strongest(links: csr_matrix) -> tuple[np.ndarray, np.ndarray]:
+    """The same of links (n,n) that differ in strength, along the strongest that connect all: positive between two of
+    one sign, negative between two that differ."""
+    order = abs(links)
+    order.data = 2 * order.data.max(initial=0.0) - order.data
+    tail, head = minimum_spanning_tree(order).nonzero()
+    relation = np.sign(np.asarray(links[tail, head]).reshape(-1)) if len(tail) else np.empty(0)
+    return spread_signs(symmetric(relation, tail, head, links.shape[0]))

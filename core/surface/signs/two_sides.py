@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
-from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
 
@@ -31,7 +31,7 @@ from ...parallel import over_rows
 from ...progress import Progress
 from ..edges.crossings import Crossings
 from .sides import patch_lengths, patches
-from .spreading import spread_signs
+from .spreading import spread_strongest
 
 _NEAR_FOLD = 24  # samples around a place, among which the other sheet of a fold is looked for
 _SHARP, _FOLD = -0.1, 0.9  # cosines between normals into the wedge of a sharp fold, and size of those of others
@@ -204,7 +204,7 @@ def _orientations(links, progress):
     negative weight, (m,m) sparse and symmetric; in each connected part."""
     strength = abs(links)
     degree = np.asarray(strength.sum(axis=1)).reshape(-1)
-    facing, part = _along_tree(links, strength)
+    facing, part = spread_strongest(links)
     size = np.bincount(part)
     shift = _SHIFT * np.median(degree[degree > 0]) if links.nnz else 1.0
     matrix, scales = diags(degree + shift) - links, diags(1 / (degree + shift))
@@ -217,16 +217,6 @@ def _orientations(links, progress):
         if ((facing > 0) == before).all():
             break
     return facing
-
-
-def _along_tree(links, strength):
-    """Signs (m,) that agree with the strongest links that connect all, by a spanning tree in each connected part, and
-    the number of that part, (m,)."""
-    order = strength.copy()
-    order.data = 2 * order.data.max(initial=0.0) - order.data
-    tail, head = minimum_spanning_tree(order).nonzero()
-    relation = np.sign(np.asarray(links[tail, head]).reshape(-1)) if len(tail) else np.empty(0)
-    return spread_signs(symmetric(relation, tail, head, links.shape[0]))
 
 
 def _agree(votes, side, band, grid, progress):

@@ -9,17 +9,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
+from ...linalg import cross, dots
 from ...lookup import numbered, rows_of
-from ..mesh import Mesh
+from ..mesh import Mesh, at_corners
 from ..meshing.fillings import edge_keys, face_keys, fillings
 
 _LONGEST = 64  # edges of a loop that may be closed
 _DETOUR, _CORNER = 1.5, 1.0  # of the way along the other sheet, relative to the straight one, and cells more
 _NEAR = 0.5  # cells, the surface is where it is this near
 _UNSEEN = 2.0  # cells, narrower openings are below what the grid shows
-_DOUBLED = 0.75  # of a loop's border, where the filling would lie on faces that are there
+_DOUBLED = 0.75  # of a loop's border, or of its filling's area, where that would lie on faces that are there
+_LARGE = 10.0  # square cells of filling; smaller ones close notches, where faces may lie as close
+_ON, _AROUND = 0.25, 8  # cells off a face that a filling lies on it, and how many of the nearest are looked at
 _TINY = np.finfo(float).tiny
 
 
@@ -72,6 +76,7 @@ def _filled(mesh, borders, loops, paths, surface, cell):
     bridged = surface.bridge * np.median(surface.spacing[around], axis=1)
     closed = (longest <= np.maximum(bridged, _UNSEEN * cell)) | (off <= _NEAR * cell)
     closed &= _doubled(mesh, edges[counts == 1], loops) < _DOUBLED
+    closed &= _covered(mesh, triangle, loop, len(loops), cell) < _DOUBLED
     if not closed.any():
         return mesh
     return replace(mesh, faces=np.concatenate([mesh.faces, triangle[closed[loop]]]).astype(np.int32))
@@ -110,6 +115,22 @@ def _doubled(mesh, border, loops):
         axis = _unit(np.cross(tail - tail[0], head - tail[0]).sum(axis=0))
         share[number] = length @ _unit(np.cross(head - tail, beyond[row] - tail)) @ axis / max(length.sum(), _TINY)
     return share
+
+
+def _covered(mesh, triangle, loop, loops, cell):
+    """The share of each loop's filling, by area, whose triangles (t,3) have their middles on faces that are there,
+    (loops,) float64, 0 of small ones. The way that closes a piece of border may run across the border's own sheet."""
+    middle = mesh.vertices[triangle].mean(axis=1)
+    a, b, c = at_corners(mesh.vertices, mesh.faces)
+    row = KDTree(((a + b + c) / 3).T).query(middle, range(1, 1 + min(_AROUND, len(mesh.faces))), workers=-1)[1]
+    a, b, c = (corner[:, row] - middle.T[:, :, None] for corner in (a, b, c))
+    normal = cross(b - a, c - a)
+    size = np.maximum(np.sqrt(dots(normal, normal)), _TINY)
+    within = np.min([dots(cross(p, q), normal) for p, q in ((a, b), (b, c), (c, a))], axis=0) >= 0
+    on = (within & (np.abs(dots(a, normal)) <= _ON * cell * size)).any(axis=1)
+    area = Mesh(mesh.vertices, triangle).face_areas()
+    total = np.bincount(loop, area, loops)
+    return np.bincount(loop, on * area, loops) / np.where(total < _LARGE * cell**2, np.inf, total)
 
 
 def _unit(vectors):

@@ -3,35 +3,36 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
-from ...linalg import cross, dots
+from ...linalg import cross, dots, lengths, symmetric
 from ..mesh import Mesh, at_corners, edge_numbers, faces_across
-from ..signs.spreading import spread_signs
+from ..signs.spreading import spread_signs, spread_strongest
+
+_SMOOTH = 0.7  # least cosine between the normals of two faces across whose edge a surface is smooth
+_LEAST = 1.01  # what makes cosines strengths
 
 
 def orient(mesh: Mesh) -> tuple[Mesh, int]:
     """The mesh wound alike across every edge that has two faces, and the number of such edges where that fails.
 
     Faces are visited breadth-first within each patch (patches end at borders and at edges with three or more faces),
-    so failures lie along one line of a patch that cannot be oriented, a Moebius band's for instance, and around quads.
+    first what is smooth and off such edges, whose parts are then turned to agree with each other. So failures of a
+    patch that cannot be oriented lie along bends, or where a line of three faces has a gap; else along one line, a
+    Moebius band's for instance, and around quads.
     A patch is turned so that its area-weighted normals point away from the mesh's centre; a closed one points outwards.
     """
     n = len(mesh.faces)
     if not n:
         return mesh, 0
     edge, count = edge_numbers(mesh.faces, len(mesh.vertices))
-    pair, forward = faces_across(edge, count), mesh.faces < np.roll(mesh.faces, -1, axis=1)
+    pair, forward = np.stack(faces_across(edge, count)), mesh.faces < np.roll(mesh.faces, -1, axis=1)
     against = np.bincount(edge.reshape(-1), forward.reshape(-1))[count == 2] != 1
 
-    links = coo_matrix((np.where(against, 2, 1), pair), shape=(n, n)).tocsr()
-    links = links.maximum(links.T)
-    links.data = np.where(links.data == 2, -1, 1)
-    sign, patch = spread_signs(links)
-    turned = sign < 0
-
     a, b, c = at_corners(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
-    outwards = dots(cross(b - a, c - a), a)
+    normal = cross(b - a, c - a)
+    sign, patch = _spread(np.where(against, -1.0, 1.0), pair, normal, _beside_lines(mesh.faces, edge, count))
+    turned = sign < 0
+    outwards = dots(normal, a)
     inwards = np.bincount(patch, np.where(turned, -outwards, outwards)) < 0
     turned ^= inwards[patch]
     halves = np.arange(2 * mesh.pairs).reshape(2, -1)
@@ -39,6 +40,30 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     turned[halves[1, whole]] = turned[halves[0, whole]]
     failures = int((against != (turned[pair[0]] ^ turned[pair[1]])).sum())
     return _with_turned(mesh, turned), failures
+
+
+def _beside_lines(faces, edge, count):
+    """Which faces have a vertex in common with one at an edge of three faces or more, (f,) bool."""
+    near = np.zeros(faces.max() + 1, bool)
+    near[faces[(count[edge] > 2).any(axis=1)]] = True
+    return near[faces].any(axis=1)
+
+
+def _spread(relation, pair, normal, beside):
+    """Signs of the faces, (f,), and the number of the patch of each, (f,), from the `relation` -1 or 1 (p,) of the two
+    faces of a `pair` (2,p), first of smooth ones that are not `beside` lines, (f,) bool, then between the parts that
+    this leaves, by the smoothest."""
+    unit = normal / np.maximum(lengths(normal), np.finfo(float).tiny)
+    cosine = relation * dots(*(unit.take(face, axis=1) for face in pair))
+    smooth = (cosine > _SMOOTH) & ~beside[pair].any(axis=0)
+    links = symmetric(relation[smooth], *pair[:, smooth], normal.shape[1])
+    links.data = np.sign(links.data)
+    sign, part = spread_signs(links)
+    one, other = part[pair]
+    across = one != other
+    agreement = (relation * sign[pair[0]] * sign[pair[1]] * (_LEAST + cosine))[across]
+    whole, patch = spread_strongest(symmetric(agreement, one[across], other[across], part.max() + 1))
+    return sign * whole[part], patch[part]
 
 
 def _with_turned(mesh, turned):

@@ -2,11 +2,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
-from core import Mesh
+from core import Mesh, Settings, reconstruct
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.single.holes import _without_long_loops, fill_pinholes
+from core.surface.meshing.fillings import fillings
+from core.surface.single.holes import _covered, _without_long_loops, fill_pinholes
 from tests import shapes
 
 CELL = 0.05
@@ -161,3 +163,52 @@ def test_a_hole_in_a_corner_closes_along_both_other_sheets(plane):
     assert (holed.edge_counts()[1] == 1).sum() == (closed.edge_counts()[1] == 1).sum() + 2
     again = fill_pinholes(holed, plane, CELL)
     assert sorted(map(sorted, again.faces.tolist())) == sorted(map(sorted, closed.faces.tolist()))
+
+
+def test_fillings_on_faces_that_are_there_are_told():
+    """Of the outline of a block of cells: on it, up to a quarter of a cell above it, in its place, and half on it; not
+    of a small one."""
+
+    def covered(mesh, width=8, height=0.0):
+        side = np.arange(width)
+        far, near = np.full(width, width), np.zeros(width, int)
+        x = np.concatenate([side, far, width - side, near])
+        y = np.concatenate([near, side, far, width - side])
+        ring = 31 * (10 + x) + 10 + y
+        place = mesh.vertices.copy()
+        place[ring, 2] += height * CELL
+        none = np.empty(0, np.int64)
+        triangle, loop = fillings(place, [ring], none, none, CELL)
+        above = Mesh(np.concatenate([mesh.vertices, place]), mesh.faces)
+        return _covered(above, triangle + len(place), loop, 1, CELL)[0]
+
+    assert covered(lattice(set())) == covered(lattice(set()), height=0.2) == 1
+    assert covered(lattice(set()), height=0.3) == covered(lattice(block(8))) == covered(lattice(set()), width=3) == 0
+    half = {(i, j) for i, j in block(8) if i >= 14}
+    assert covered(lattice(half)) == pytest.approx(0.5, abs=0.1)
+
+
+def honeycomb(n, seed):
+    """Samples of three hexagonal tubes that share walls, with sides of 1, and where walls meet or end, (c,2)."""
+    turn = np.arange(6) * np.pi / 3
+    corners = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    walls = set()
+    for middle in ([0, 0], [1.5, np.sqrt(0.75)], [0, np.sqrt(3)]):
+        ends = [tuple(end) for end in np.round(corners + middle, 6).tolist()]
+        walls |= {(min(pair), max(pair)) for pair in zip(ends, ends[1:] + ends[:1], strict=True)}
+    low, high = np.array(sorted(walls)).transpose(1, 0, 2)
+    random = np.random.default_rng(seed)
+    wall, share = random.integers(0, len(low), n), random.random((n, 1))
+    place = low[wall] + share * (high - low)[wall]
+    return np.column_stack([place, random.uniform(0, 1.2, n)]), np.unique(np.concatenate([low, high]), axis=0)
+
+
+def test_the_way_that_closes_a_border_does_not_double_its_own_sheet():
+    """One of 15 walls was doubled for ten edges along a line of three faces across it."""
+    points, corners = honeycomb(3000, 3)
+    mesh = reconstruct(points, Settings(resolution=64, surface="single", denoise=0)).sheet
+    edges, count = mesh.edge_counts()
+    line = mesh.vertices[edges[count > 2]].mean(axis=1)
+    assert len(line) > 30
+    assert KDTree(corners).query(line[:, :2])[0].max() < 0.15
+    assert mesh.face_areas().sum() < 1.2 * 15

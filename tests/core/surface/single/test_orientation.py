@@ -63,6 +63,32 @@ def test_patches_end_where_three_sheets_meet():
     assert orient(Mesh(vertices, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], np.int32)))[1] == 0
 
 
+def joined(n, wide, parted):
+    """Three half planes of n x `wide` quads along a line, but for the one that each step of the line, (n,), parts from
+    the other two; -1 for none."""
+    along, out = np.meshgrid(np.arange(n + 1), np.arange(wide + 1), indexing="ij")
+    turn = 2 * np.pi / 3 * np.arange(3)[:, None, None]
+    vertices = np.stack([out * np.cos(turn), out * np.sin(turn), np.broadcast_to(along, (3, *along.shape))], axis=-1)
+    number = np.arange(3 * along.size).reshape(3, *along.shape)
+    corners = np.stack([number[:, :-1, :-1], number[:, 1:, :-1], number[:, 1:, 1:], number[:, :-1, 1:]], axis=-1)
+    for step, apart in enumerate(parted):
+        for sheet in {0, 1, 2} - {apart}:
+            corners[sheet, step, 0, :2] = number[(apart + 1) % 3 if apart >= 0 else 0, step : step + 2, 0]
+    quads = corners.reshape(-1, 4)
+    return Mesh(vertices.reshape(-1, 3), np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]).astype(np.int32))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sheets_fail_where_the_line_along_which_they_meet_has_gaps(seed):
+    """Each two of three are joined by themselves over some steps, which no winding of all three allows."""
+    parted = np.full(30, -1)
+    parted[[4, 5]], parted[[13, 14, 15]], parted[[24, 25]] = 0, 1, 2
+    mesh, failures = orient(shuffled(joined(30, 12, parted), seed))
+    assert 0 < failures <= 3
+    far = (np.hypot(*mesh.vertices[:, :2].T)[mesh.faces] > 1).any(axis=1)
+    assert backward_edges(Mesh(mesh.vertices, mesh.faces[far])) == 0
+
+
 def test_patches_are_turned_one_by_one():
     """Two tetrahedra and a single face."""
     parts = shuffled(tetrahedron([-5, 0, 0]), 1), shuffled(tetrahedron([5, 0, 0]), 2)
