@@ -240,11 +240,16 @@ def bridged_reach(distance, spacing) -> np.ndarray:
     return np.maximum(DISC * spacing, _BRIDGED * distance)
 
 
-def chain_lengths(rims: Rims, marked) -> np.ndarray:
-    """Of the samples marked, (n,) bool, how many there are in a row with each, one bounding the next one's gap, (n,);
-    1 for those that are not marked."""
+def chains(rims: Rims, marked) -> np.ndarray:
+    """Of the samples marked, (n,) bool, the number of the row that each is in, (n,), where one bounds the next one's
+    gap; one of its own for each that is not marked."""
     n = len(marked)
     tail, head = np.repeat(np.flatnonzero(marked), 2), rims.beside[marked].reshape(-1)
     tail, head = tail[marked[head]], head[marked[head]]
-    _, chain = connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)
+    return connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)[1]
+
+
+def chain_lengths(rims: Rims, marked) -> np.ndarray:
+    """How many samples there are in the row of each, (n,)."""
+    chain = chains(rims, marked)
     return np.bincount(chain)[chain]

@@ -16,11 +16,12 @@ from ...linalg import row_dots
 from ...parallel import in_order
 from ...progress import Progress
 from ..cloud import Cloud
-from .borders import RIM, Rims, chain_lengths, one_sheet
+from .borders import RIM, Rims, chains, one_sheet
 from .rim_fits import beside, lowest_lines
 from .rim_gaps import RimGaps, find_rim_gaps, spacing_around
 
-_CHAIN = 12  # least number of samples in a row that are a rim; fewer are gaps in the sampling
+_CHAIN = 12  # least number of samples in a row that are a rim; fewer may be gaps in the sampling
+_SHORT = 4  # the same of those that see more than half of the plane around them empty, on average
 _WINDOW = 5.0  # local spacings to either side of a sample, how far its line looks
 _NEAREST = 96  # samples, how many it looks at
 _BINS = 16  # of the window; each keeps its outermost sample
@@ -40,8 +41,7 @@ def with_rim_lines(rims: Rims, cloud: Cloud, progress=None) -> Rims:
     """The rims with margins up to the lines through their outermost samples, or across gaps in the sampling, and with
     patches of other samples, bridged gaps too, ended at those lines."""
     progress, normals, spacing = Progress.of(progress), cloud.normals, cloud.spacing
-    rim = rims.gap & ~rims.bridged
-    row = np.flatnonzero(rim & (chain_lengths(rims, rim) >= _CHAIN))
+    row = np.flatnonzero(_at_rims(rims))
     if not len(row):
         return rims
 
@@ -77,6 +77,15 @@ def with_rim_lines(rims: Rims, cloud: Cloud, progress=None) -> Rims:
     corner = _nearest_line(lines, across, cloud, lines.up[in_gap])
     lines_at = (np.concatenate(pair) for pair in zip((other, way, distance), (across, *corner), strict=True))
     return _ended(replace(rims, margin=margin, reach=reach), *lines_at, spacing)
+
+
+def _at_rims(rims):
+    """Which samples lie at rims, (n,) bool, not at gaps in the sampling."""
+    rim = rims.gap & ~rims.bridged
+    chain = chains(rims, rim)
+    length = np.bincount(chain)
+    wide = np.bincount(chain, rims.opening) < 0
+    return rim & ((length >= _CHAIN) | (wide & (length >= _SHORT)))[chain]
 
 
 def _ended(rims, sample, way, distance, spacing):

@@ -1,11 +1,13 @@
 """Rims by lines through the outermost samples, on shapes whose rims are known. Lengths are local spacings of 0.02."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from core.field.cloud import Cloud
 from core.field.local_surface import fit_local_surface
-from core.field.rims.borders import RIM, find_rims
-from core.field.rims.rim_lines import with_rim_lines
+from core.field.rims.borders import RIM, chains, find_rims
+from core.field.rims.rim_lines import _at_rims, with_rim_lines
 from core.points import local_spacing
 from tests import shapes
 
@@ -94,3 +96,31 @@ def test_signs_of_normals_do_not_matter(random):
     rim = lined.gap & ~lined.bridged
     for margin in (lambda rims: rims.margin[rim, 0], lambda rims: np.sort(rims.margin[rim, 1:], axis=1)):
         np.testing.assert_allclose(margin(turned), margin(lined), atol=0.05 * spacing.mean())
+
+
+def test_short_rows_are_rims_where_more_than_half_around_them_is_empty():
+    rims, _ = rims_of(*flat(scattered()))
+    rim = rims.gap & ~rims.bridged
+    chain = chains(rims, rim)
+    row = np.flatnonzero(chain == np.bincount(chain).argmax())
+    assert _at_rims(rims)[row].all()
+    for count, opening, found in (
+        (3, -0.1, False),
+        (6, -0.1, True),
+        (6, 0.1, False),
+        (11, 0.1, False),
+        (30, 0.1, True),
+    ):
+        short = np.isin(np.arange(len(rim)), _in_a_row(rims, row, count))
+        left = replace(rims, gap=short, opening=np.where(short, opening, rims.opening))
+        np.testing.assert_array_equal(_at_rims(left), short & found)
+
+
+def _in_a_row(rims, row, count):
+    """So many of the samples in a row, one beside the next."""
+    chosen = [row[0]]
+    for sample in chosen:
+        chosen += [other for other in rims.beside[sample].tolist() if other in row and other not in chosen]
+        if len(chosen) >= count:
+            return chosen[:count]
+    return chosen
