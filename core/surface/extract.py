@@ -141,15 +141,16 @@ class _Layers:
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
 
     def _may_be_sheet(self):
-        """Whether to look for a single layer. Sheets that pass through each other have one with handles; sheets side by
-        side have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
+        """Whether to look for a single layer. Sheets that pass through each other have one that turns off there, or has
+        handles, unless a closed shape and its lines are known; sheets side by side have a torn one, but a closed shape
+        does not whose walls run close, or whose corners look like that."""
         cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
         if self.meetings.share <= _FEW:
             return True
         if self.meetings.pass_through:
-            return False
+            return bool(self.meetings.passing.any()) and self.sides.complete
         return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
     def _is_whole(self):
@@ -193,10 +194,10 @@ def extract_surfaces(
     """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
     :func:`band_for` says, and the nodes near the surface.
 
-    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
-    other or run side by side, or meet where samples do not show it, or samples are sparse, or so dense that chords are
-    most of the error, of which two layers extracted apart have less, and no sheets run close; then it is extracted at
-    an offset, see :mod:`.double.double_cover`.
+    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets that are not closed
+    pass through each other, or sheets run side by side, or meet where samples do not show it, or samples are sparse, or
+    so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets run close;
+    then it is extracted at an offset, see :mod:`.double.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

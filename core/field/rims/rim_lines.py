@@ -21,7 +21,8 @@ from .rim_fits import beside, lowest_lines
 from .rim_gaps import RimGaps, find_rim_gaps, spacing_around
 
 _CHAIN = 12  # least number of samples in a row that are a rim; fewer may be gaps in the sampling
-_SHORT = 4  # the same of those that see more than half of the plane around them empty, on average
+_SHORT = 4  # the same of those that see more than half of the plane around them empty
+_WIDE = -0.05  # cosine of half the angle that they see empty, on average at most
 _WINDOW = 5.0  # local spacings to either side of a sample, how far its line looks
 _NEAREST = 96  # samples, how many it looks at
 _BINS = 16  # of the window; each keeps its outermost sample
@@ -84,7 +85,7 @@ def _at_rims(rims):
     rim = rims.gap & ~rims.bridged
     chain = chains(rims, rim)
     length = np.bincount(chain)
-    wide = np.bincount(chain, rims.opening) < 0
+    wide = np.bincount(chain, rims.opening) < _WIDE * length
     return rim & ((length >= _CHAIN) | (wide & (length >= _SHORT)))[chain]
 
 

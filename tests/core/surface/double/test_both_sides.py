@@ -258,13 +258,27 @@ def test_whatever_the_sheet_the_cover_is_manifold(seed):
         (shapes.scattered_sphere(150), False),
         (shapes.sphere(20_000), False),
         (slab(1500), True),
-        (figure_eight(3000), False),
+        (figure_eight(3000), True),
+        (leaves(2400, [0, 90, 180, 270]), False),
     ],
-    ids=["torus", "disc", "junction", "wedge", "Y", "moebius", "sparse", "dense", "close walls", "crossed"],
+    ids=[
+        "torus",
+        "disc",
+        "junction",
+        "wedge",
+        "Y",
+        "moebius",
+        "sparse",
+        "dense",
+        "close walls",
+        "crossed",
+        "crossed, open",
+    ],
 )
 def test_a_run_covers_the_single_layer_where_that_is_the_whole_surface(points, same):
-    """It is neither sparse nor dense, does not pass through itself, and where sheets meet they do not run side by side
-    and samples show that they meet, which those of sheets at the same angles to each other do not."""
+    """It is neither sparse nor dense, passes through itself only if it is closed and samples show the line, and where
+    sheets meet they do not run side by side and samples show that they meet, which those of sheets at the same angles
+    to each other do not."""
     run = reconstruct(points, Settings(resolution=48, surface="both"))
     assert is_of_sheet(run) == same
 
