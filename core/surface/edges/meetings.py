@@ -27,9 +27,9 @@ _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 _WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
 _THROUGH = 0.125  # of the samples at meetings, as many of sheets that pass through one another are no chance
+_BESIDE = 0.05  # the same, more than so many, of samples beside another sheet
 _LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all these, at least
 _PASSING = 24  # samples around one, with such a sample among which it is close to the line
-_BESIDE = 0.05  # the same of samples beside another sheet
 
 
 @dataclass(frozen=True)

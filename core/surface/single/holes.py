@@ -120,7 +120,12 @@ def _doubled(mesh, border, loops):
 def _covered(mesh, triangle, loop, loops, cell):
     """The share of each loop's filling, by area, whose triangles (t,3) have their middles on faces that are there,
     (loops,) float64, 0 of small ones. The way that closes a piece of border may run across the border's own sheet."""
-    middle = mesh.vertices[triangle].mean(axis=1)
+    area = Mesh(mesh.vertices, triangle).face_areas()
+    total = np.bincount(loop, area, loops)
+    large = (total >= _LARGE * cell**2)[loop]
+    if not large.any():
+        return np.zeros(loops)
+    middle = mesh.vertices[triangle[large]].mean(axis=1)
     a, b, c = at_corners(mesh.vertices, mesh.faces)
     row = KDTree(((a + b + c) / 3).T).query(middle, range(1, 1 + min(_AROUND, len(mesh.faces))), workers=-1)[1]
     a, b, c = (corner[:, row] - middle.T[:, :, None] for corner in (a, b, c))
@@ -128,9 +133,7 @@ def _covered(mesh, triangle, loop, loops, cell):
     size = np.maximum(np.sqrt(dots(normal, normal)), _TINY)
     within = np.min([dots(cross(p, q), normal) for p, q in ((a, b), (b, c), (c, a))], axis=0) >= 0
     on = (within & (np.abs(dots(a, normal)) <= _ON * cell * size)).any(axis=1)
-    area = Mesh(mesh.vertices, triangle).face_areas()
-    total = np.bincount(loop, area, loops)
-    return np.bincount(loop, on * area, loops) / np.where(total < _LARGE * cell**2, np.inf, total)
+    return np.bincount(loop[large], on * area[large], loops) / np.maximum(total, _TINY)
 
 
 def _unit(vectors):
