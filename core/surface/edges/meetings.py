@@ -37,8 +37,8 @@ class Meetings:
     """Samples in whose neighbourhood there are several sheets.
 
     at      : (n,) bool
-    through : (n,) bool, those of them whose sheet passes through another one
-    beside  : (n,) bool, those of them with another sheet that runs side by side with theirs
+    through : (n,) bool, samples, mostly such ones, whose sheet passes through another one
+    beside  : (n,) bool, those at meetings with another sheet that runs side by side with theirs
     passing : (n,) bool, all samples close to lines along which sheets pass through one another
     """
 
@@ -87,7 +87,7 @@ def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
     through = _among(n, i[askew][past == 2], j[askew][past == 2])
     side_by_side = apart & (cosine > _SIDE_BY_SIDE)
     beside = at & _among(n, i[side_by_side], j[side_by_side])
-    return Meetings(at, at & through, beside, _of_lines(through, nearest)[nearest[:, :_PASSING]].any(axis=1))
+    return Meetings(at, through, beside, _of_lines(through, nearest)[nearest[:, :_PASSING]].any(axis=1))
 
 
 def _among(n, *rows):
