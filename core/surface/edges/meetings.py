@@ -37,7 +37,7 @@ class Meetings:
     """Samples in whose neighbourhood there are several sheets.
 
     at      : (n,) bool
-    through : (n,) bool, samples, mostly such ones, whose sheet passes through another one
+    through : (n,) bool, samples whose sheet passes through another one, mostly some of those
     beside  : (n,) bool, those at meetings with another sheet that runs side by side with theirs
     passing : (n,) bool, all samples close to lines along which sheets pass through one another
     """
