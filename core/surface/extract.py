@@ -142,8 +142,8 @@ class _Layers:
 
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one that turns off there, or has
-        handles, unless a closed shape and its lines are known; sheets side by side have a torn one, but a closed shape
-        does not whose walls run close, or whose corners look like that."""
+        handles, unless the shape is closed and its lines are known; sheets side by side have a torn one, but a closed
+        shape does not whose walls run close, or whose corners look like that."""
         cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False

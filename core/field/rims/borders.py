@@ -250,6 +250,6 @@ def chains(rims: Rims, marked) -> np.ndarray:
 
 
 def chain_lengths(rims: Rims, marked) -> np.ndarray:
-    """How many samples there are in the row of each, (n,)."""
+    """How many samples there are in the row of each, (n,), see :func:`chains`."""
     chain = chains(rims, marked)
     return np.bincount(chain)[chain]

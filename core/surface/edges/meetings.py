@@ -100,24 +100,26 @@ def _among(n, *rows):
 def _grown(sure, weak, nearest):
     """The samples marked as `weak` (n,) bool that others connect to `sure` ones, as weak edges of an image (Canny, IEEE
     PAMI 8(6), 1986), (n,) bool; `nearest` (n,k) tells which lie next to each other."""
-    n, of = len(nearest), np.flatnonzero(weak)
-    beside = nearest[of, : 1 + _NEXT]
-    row, column = np.nonzero(weak[beside])
-    graph = coo_matrix((np.ones(len(row), bool), (of[row], beside[row, column])), shape=(n, n))
-    part = connected_components(graph, directed=False)[1]
+    part = _parts(weak, nearest[:, : 1 + _NEXT])
     return weak & np.isin(part, part[sure])
 
 
 def _of_lines(through, nearest):
     """Which of the samples of sheets that pass `through` one another, (n,) bool, show a line: where many are connected,
     and they are many of those around. At tight bends and thin parts some samples look like that by chance."""
-    n, of = len(nearest), np.flatnonzero(through)
-    row, column = np.nonzero(through[nearest[of]])
-    graph = coo_matrix((np.ones(len(row), bool), (of[row], nearest[of[row], column])), shape=(n, n))
-    part = connected_components(graph, directed=False)[1].astype(np.int64)
+    n, of, part = len(nearest), np.flatnonzero(through), _parts(through, nearest)
     around = np.unique(part[of, None] * n + nearest[of, : 1 + _AROUND]) // n
     count = np.bincount(part[of], minlength=n)
     return through & ((count >= _LINE) & (count >= _DENSE * np.bincount(around, minlength=n)))[part]
+
+
+def _parts(marked, nearest):
+    """Number of the connected part of each sample, (n,) int64, where those marked, (n,) bool, are connected to the
+    others among their `nearest` (n,k)."""
+    n, of = len(nearest), np.flatnonzero(marked)
+    row, column = np.nonzero(marked[nearest[of]])
+    graph = coo_matrix((np.ones(len(row), bool), (of[row], nearest[of[row], column])), shape=(n, n))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _linked(i, j, nearest, alike, sure):
