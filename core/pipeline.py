@@ -114,7 +114,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "counts": {
             "input": given,
             "samples": len(samples.points),
-            "rim_samples": int((local.rims.gap & ~local.rims.bridged).sum()),
+            "rim_samples": int(local.rims.open.sum()),
             "bridged_samples": int(local.rims.bridged.sum()),
             "nodes": surfaces.values.size,
         },

@@ -76,7 +76,7 @@ def _relax(mesh, loose):
 
 
 def _refusal(sides, surface, place):
-    border = surface.rims.gap & ~surface.rims.bridged
+    border = surface.rims.open
     if sides.within.mean() > 0.5 or not border.any():
         return (
             f"no signed distance: {sides.share:.0%} of the surface has the same side on both faces, as inner walls and "

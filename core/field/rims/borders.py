@@ -67,6 +67,11 @@ class Rims:
     crease: np.ndarray
     limit: np.ndarray
 
+    @property
+    def open(self) -> np.ndarray:
+        """(n,) bool, whether the surface ends there: at gaps that are not bridged."""
+        return self.gap & ~self.bridged
+
     @cached_property
     def farthest(self) -> np.ndarray:
         """(n,) how far the patch covers gaps to either side."""

@@ -61,7 +61,7 @@ def with_rim_lines(rims: Rims, cloud: Cloud, progress=None) -> Rims:
     size = spacing[row]
     margin[row, 0] = size * lines.margin(lines.height / np.sqrt(1 + lines.slope**2))
 
-    other = np.flatnonzero(~rims.gap | rims.bridged)
+    other = np.flatnonzero(~rims.open)
     way, distance = _nearest_line(lines, other, cloud)
     known = RIM * spacing
     known[other] = np.where(np.isfinite(distance), distance, known[other])
@@ -82,7 +82,7 @@ def with_rim_lines(rims: Rims, cloud: Cloud, progress=None) -> Rims:
 
 def _at_rims(rims):
     """Which samples lie at rims, (n,) bool, not at gaps in the sampling."""
-    rim = rims.gap & ~rims.bridged
+    rim = rims.open
     chain = chains(rims, rim)
     length = np.bincount(chain)
     wide = np.bincount(chain, rims.opening) < _WIDE * length

@@ -56,7 +56,7 @@ def with_sparser_parts_joined(rims: Rims, cloud: Cloud, bridge: float, progress=
     """The rims with gaps bridged beyond which the sheet goes on more sparsely sampled, no wider than `bridge` local
     spacings of the sample across."""
     progress, spacing = Progress.of(progress), cloud.spacing
-    row = np.flatnonzero(rims.gap & ~rims.bridged)
+    row = np.flatnonzero(rims.open)
     row = row[_near_steps(row, cloud, _FURTHER * bridge)]
     distance, other = _looked_across(row, rims.outward[row], cloud, _FURTHER * bridge, progress.part(0.0, 0.9), _MOST)
     ordinary = distance <= bridge * spacing[other]
@@ -74,7 +74,7 @@ def with_sampling_gaps_bridged(rims: Rims, cloud: Cloud, bend, bridge: float, pr
     again as `bridge` local spacings, and have no walls beside them; `bend` (n,3,3) of the patches."""
     points, spacing = cloud.points, cloud.spacing
     few = chain_lengths(rims, rims.gap) <= _FEW
-    rim = rims.gap & ~rims.bridged
+    rim = rims.open
     round_ = ~rims.gap & (rims.opening < np.cos(_ROUND / 2)) & _far_from(rim & ~few, points, spacing)
     row, widest = np.flatnonzero(rim & few | round_), min(_WIDER * bridge, _left_by_chance(len(cloud)))
     distance, other = _looked_across(row, rims.outward[row], cloud, widest, progress)

@@ -17,7 +17,7 @@ def rims_of(points, normals, bridge=3.0):
 
 
 def open_rim(rims):
-    return rims.gap & ~rims.bridged
+    return rims.open
 
 
 def test_the_rim_of_a_disc_is_found_and_nothing_else():

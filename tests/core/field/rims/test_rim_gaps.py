@@ -39,7 +39,7 @@ def gaps_at(surface, row, outward):
 
 def below(surface, depth):
     """Samples at rims this near the lower side, and the way out there."""
-    rim = surface.rims.gap & ~surface.rims.bridged
+    rim = surface.rims.open
     row = np.flatnonzero(rim & (surface.points[:, 1] < depth * SPACING) & (abs(surface.points[:, 0] - 0.5) < 0.3))
     return row, np.tile([0.0, -1, 0], (len(row), 1))
 
@@ -120,7 +120,7 @@ def test_curved_rims_have_no_gaps():
     points = square()
     radius = np.hypot(*(points - 0.5).T)
     surface = surface_of(points[radius > 6 * SPACING])
-    rim = surface.rims.gap & ~surface.rims.bridged
+    rim = surface.rims.open
     row = np.flatnonzero(rim & (np.hypot(*(surface.points[:, :2] - 0.5).T) < 8 * SPACING))
     outward = 0.5 - surface.points[row] * [1, 1, 0] - [0, 0, 0.5]
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)

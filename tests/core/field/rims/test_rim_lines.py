@@ -93,14 +93,14 @@ def test_signs_of_normals_do_not_matter(random):
     points, normals, spacing = flat(scattered(900))
     _, lined = rims_of(points, normals, spacing)
     _, turned = rims_of(points, normals * random.choice([-1.0, 1.0], (len(points), 1)), spacing)
-    rim = lined.gap & ~lined.bridged
+    rim = lined.open
     for margin in (lambda rims: rims.margin[rim, 0], lambda rims: np.sort(rims.margin[rim, 1:], axis=1)):
         np.testing.assert_allclose(margin(turned), margin(lined), atol=0.05 * spacing.mean())
 
 
 def test_short_rows_are_rims_where_more_than_half_around_them_is_empty():
     rims, _ = rims_of(*flat(scattered()))
-    rim = rims.gap & ~rims.bridged
+    rim = rims.open
     chain = chains(rims, rim)
     row = np.flatnonzero(chain == np.bincount(chain).argmax())
     assert _at_rims(rims)[row].all()

@@ -41,7 +41,7 @@ def sparser_to_one_side(points, ratio, random):
 
 
 def open_rim(rims):
-    return rims.gap & ~rims.bridged
+    return rims.open
 
 
 def test_random_samples_of_a_closed_surface_leave_gaps_and_nearly_all_are_bridged():
