@@ -124,6 +124,13 @@ def table_shape(shape) -> tuple[int, int, int]:
     return tuple(-(-n // SIDE) for n in shape)
 
 
+def block_corners(array: "np.ndarray | Blocks") -> np.ndarray:
+    """(b,3) int64, indices (i,j,k) of the lowest node of each block that is stored, of an array of all."""
+    if isinstance(array, Blocks):
+        return array.corners()
+    return SIDE * np.indices(table_shape(array.shape)).reshape(3, -1).T
+
+
 def node_gradient(values: "np.ndarray | Blocks", spacing: float) -> "np.ndarray | Blocks":
     """Central differences of float32 values at every node, the last axis x, y, z; one-sided at the sides of the box. In
     Blocks zero at nodes with a neighbour that has the value of a constant block or more."""

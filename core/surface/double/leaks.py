@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...field.blocks import Blocks, at_nodes, each, inner_nodes, marked_nodes, put, regions
+from ...field.blocks import SIDE, Blocks, at_nodes, block_corners, each, inner_nodes, marked_nodes, put, regions
 from ...field.grid import Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...lookup import rows_of
+from ...parallel import over_rows
 from ...progress import Progress
 from ..meshing.fillings import edge_keys
 from ..signs.sides import patches, regions_beside
@@ -29,6 +30,7 @@ _ACROSS = 0.1  # share of what is seen of a region that has another across the s
 _ROUND = 0.5  # cells of distance that regions grow at a time
 _AROUND, _MOST = 32, 0.6  # samples around a leak, and the share of them that must lie between two regions
 _MARGIN = 2  # cells beyond the level where distances are lowered
+_BLOCKS = 128  # of nodes at a time
 
 
 def shut_leaks(near, values, surface: LocalSurface, grid: Grid, level: float, progress=None) -> np.ndarray:
@@ -210,14 +212,21 @@ def _middle(ends, grid):
 
 def lower_around(places: np.ndarray, near: np.ndarray | Blocks, grid: Grid, level: float) -> None:
     """Lower distances `near`, (nx,ny,nz) float32 or Blocks, in place, to those to the places (m,3), up to two cells
-    beyond a level, float."""
+    beyond a level, float; in Blocks those that are stored."""
     if not len(places):
         return
-    reach = int(np.ceil(level / grid.spacing)) + _MARGIN
-    steps = np.indices((2 * reach + 1,) * 3).reshape(3, -1).T - reach
-    cells = np.rint((places - grid.origin) / grid.spacing).astype(np.int64)
-    cells = (cells[:, None] + steps).reshape(-1, 3)
-    cells = cells[((cells >= 0) & (cells < grid.shape)).all(axis=1)]
-    node = np.unique(np.ravel_multi_index(cells.T, grid.shape))
-    away = KDTree(places).query(grid.positions(node), workers=-1)[0]
-    put(near, node, np.minimum(at_nodes(near, node), away.astype(np.float32)))
+    tree, reach = KDTree(places), level + _MARGIN * grid.spacing
+    corner = block_corners(near)
+    middle, radius = corner + 0.5 * (SIDE - 1), 0.5 * np.sqrt(3) * (SIDE - 1) * grid.spacing
+    away = tree.query(grid.origin + grid.spacing * middle, distance_upper_bound=reach + radius, workers=-1)[0]
+    corner = corner[np.isfinite(away)]
+    within = np.indices((SIDE,) * 3).reshape(3, -1).T
+
+    def lower(part):
+        cells = (corner[part, None] + within).reshape(-1, 3)
+        cells = cells[(cells < grid.shape).all(axis=1)]
+        node = np.ravel_multi_index(cells.T, grid.shape)
+        away = tree.query(grid.positions(node), distance_upper_bound=reach)[0]
+        put(near, node, np.minimum(at_nodes(near, node), away.astype(np.float32)))
+
+    over_rows(lower, len(corner), _BLOCKS)
