@@ -6,7 +6,7 @@ the label spreads over the grid, where each node decides with all its neighbours
 
 Nodes far from the surface fall into regions, of which the one at the box is outside. Between them, the side s of each
 node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the surface and of (s_a + s_b)^2 over those
-that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Farther than two cells from the
+that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Farther than 1.5 cells from the
 surface, where it crosses no edge, the nodes of a group of 2^3 share their side. Nested shells so get alternating sides:
 a hollow ball is inside between its walls, and outside within. Where the outside lies on both sides of most samples, as
 around an open sheet, no side need be asked: nothing is inside.
@@ -33,10 +33,10 @@ from ..edges.crossings import Crossings
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
 _OFF = 0.7  # cells beyond the distance where regions start, at which samples look for them
-_ALONE = 2.0  # cells from the surface, where no edge is crossed any more: nodes farther off share their sides
+_ALONE = 1.5  # cells from the surface, where no edge is crossed any more: nodes farther off share their sides
 _OUTSIDE = 0.5  # share of the samples with the outside on both sides, above which nothing is inside
 _SPECK = 27  # nodes
-_TOLERANCE, _STEPS = 1e-3, 1000
+_TOLERANCE, _STEPS = 1e-2, 1000
 _ADJACENT = 1.8  # cells, edges of one patch
 _OPEN = 0.05  # share of crossings, or of samples, with one side at both ends that a closed shape may have
 _PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening that does not count
