@@ -57,7 +57,9 @@ class _Borders:
     def of(cls, mesh) -> "_Borders":
         edges, counts = mesh.edge_counts()
         loops, paths = _simple_loops(_without_long_loops(edges[counts == 1]))
-        return cls(edges, counts, loops, paths, [_parted(path, edges[counts > 2]) for path in paths])
+        at_junction = np.zeros(len(mesh.vertices), bool)
+        at_junction[edges[counts > 2]] = True
+        return cls(edges, counts, loops, paths, [_parted(path, at_junction) for path in paths])
 
 
 def _filled(mesh, borders, loops, paths, surface, cell):
@@ -146,9 +148,9 @@ def _sides(faces):
     return np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), faces[:, [2, 0, 1]].T.reshape(-1)
 
 
-def _parted(path, edges):
-    """The pieces of a path between the vertices of `edges` (e,2) that it passes."""
-    cut = np.flatnonzero(np.isin(path[1:-1], edges)) + 1
+def _parted(path, at_junction):
+    """The pieces of a path between the vertices that it passes of those marked in `at_junction`, (v,) bool."""
+    cut = np.flatnonzero(at_junction[path[1:-1]]) + 1
     return [path[a : b + 1] for a, b in zip([0, *cut], [*cut, len(path) - 1], strict=True)]
 
 
