@@ -16,17 +16,13 @@ def rims_of(points, normals, bridge=3.0):
     return find_rims(cloud, np.zeros((len(points), 3, 3)), bridge), cloud.spacing
 
 
-def open_rim(rims):
-    return rims.open
-
-
 def test_the_rim_of_a_disc_is_found_and_nothing_else():
     points = shapes.disc(800)
     rims, spacing = rims_of(points, UP)
     inset = (1 - np.linalg.norm(points, axis=1)) / np.median(spacing)
-    assert open_rim(rims)[inset < 0.3].all()
+    assert rims.open[inset < 0.3].all()
     assert not rims.gap[inset > 1.5].any()
-    rim = open_rim(rims)
+    rim = rims.open
     outward = np.einsum("ni,ni->n", rims.outward, points / np.linalg.norm(points, axis=1, keepdims=True))
     assert outward[rim].min() > 0.8
 
@@ -42,8 +38,8 @@ def test_a_gap_that_patches_bend_over_is_bridged():
     beside = (points[:, 0] > 0.4) & (np.abs(points[:, 2]) < 0.6)
     flat, bent = (find_rims(cloud, form, 5.0) for form in (0 * bend, bend))
     assert (flat.gap & beside).any()
-    np.testing.assert_array_equal(open_rim(flat)[beside], flat.gap[beside])
-    assert not open_rim(bent)[beside].any()
+    np.testing.assert_array_equal(flat.open[beside], flat.gap[beside])
+    assert not bent.open[beside].any()
 
 
 @pytest.mark.parametrize("points", [shapes.sphere(500), shapes.sphere(3000)])

@@ -86,7 +86,7 @@ def test_strips_of_a_few_spacings_are_no_lines(width, random):
     spacing = np.median(local_spacing(points))
     points[:, 0] += 1.5 * width * spacing * np.floor(points[:, 0] / (width * spacing))
     before, after, _ = before_and_after(points)
-    assert (before.open).sum() > 1000
+    assert before.open.sum() > 1000
     assert (after.bridged & ~before.bridged)[inside(points)].mean() < 0.01
     assert (after.behind > 0)[inside(points)].mean() < 0.01
 

@@ -40,15 +40,11 @@ def sparser_to_one_side(points, ratio, random):
     return points[(points[:, 0] > 0) | (random.random(len(points)) < 1 / ratio)]
 
 
-def open_rim(rims):
-    return rims.open
-
-
 def test_random_samples_of_a_closed_surface_leave_gaps_and_nearly_all_are_bridged():
     points = shapes.scattered_sphere(20_000)
     before, after, spacing = before_and_after(points, points)
-    assert open_rim(before).sum() > 50
-    assert open_rim(after).sum() < 0.2 * open_rim(before).sum()
+    assert before.open.sum() > 50
+    assert after.open.sum() < 0.2 * before.open.sum()
     newly = after.bridged & ~before.bridged
     assert (after.reach[newly] >= spacing[newly]).all()
     np.testing.assert_array_equal(after.reach[before.bridged], before.reach[before.bridged])
@@ -59,9 +55,9 @@ def test_the_rim_of_a_random_disc_stays_open_and_gaps_inside_are_bridged(random)
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
     before, after, spacing = before_and_after(points, UP)
     inside = 1 - radius > 2 * spacing
-    assert open_rim(before)[~inside].sum() > 150
+    assert before.open[~inside].sum() > 150
     np.testing.assert_array_equal(after.bridged[~inside], before.bridged[~inside])
-    assert open_rim(after)[inside].sum() < 0.5 * open_rim(before)[inside].sum()
+    assert after.open[inside].sum() < 0.5 * before.open[inside].sum()
 
 
 @pytest.mark.parametrize("width", [3.2, 4.0])
@@ -70,7 +66,7 @@ def test_a_slit_wider_than_the_bridging_length_stays_open(width, random):
     side = 0.5 * width * np.median(local_spacing(points))
     points[:, 0] += np.sign(points[:, 0]) * side
     before, after, spacing = before_and_after(points, UP)
-    beside = open_rim(before) & (np.abs(points[:, 0]) < side + 0.6 * spacing) & (np.abs(points[:, 1]) < 0.8)
+    beside = before.open & (np.abs(points[:, 0]) < side + 0.6 * spacing) & (np.abs(points[:, 1]) < 0.8)
     assert beside.sum() > 10
     assert not after.bridged[beside].any()
 
@@ -98,7 +94,7 @@ def test_gaps_in_the_sampling_of_a_closed_surface_stay_bridged():
 def test_a_round_hole_twice_as_wide_as_the_bridging_length_stays_open():
     points = shapes.holed_square(1000, radius=0.2)
     before, after, spacing = before_and_after(points, UP)
-    around = open_rim(before) & (np.linalg.norm(points, axis=1) < 0.3)
+    around = before.open & (np.linalg.norm(points, axis=1) < 0.3)
     assert around.sum() > 5
     assert 6 * np.median(spacing) > 0.4
     np.testing.assert_array_equal(after.bridged, before.bridged)
@@ -116,7 +112,7 @@ def test_a_round_gap_that_no_sample_sees_a_wide_angle_of_is_covered(random):
     assert (after.reach > spacing)[inner & after.bridged].all()
     middle = fit_local_surface(points, np.tile(UP, (len(points), 1)), np.ones(len(points)), spacing, 3.0)
     assert middle.project(np.zeros((1, 3))).distance[0] < 0.1
-    assert open_rim(after)[np.linalg.norm(points, axis=1) > 6].mean() > 0.9
+    assert after.open[np.linalg.norm(points, axis=1) > 6].mean() > 0.9
 
 
 def test_patches_that_miss_each_other_halfway_are_not_joined(random):
@@ -139,9 +135,9 @@ def test_looking_across_some_gaps_at_a_time_changes_nothing(monkeypatch):
 def test_dense_samples_of_a_closed_surface_are_joined_to_sparse_ones(random):
     points = sparser_to_one_side(shapes.scattered_sphere(20_000), 16, random)
     joined, rims, spacing = with_and_without_sparser_parts_joined(points, points)
-    along = open_rim(rims) & (np.abs(points[:, 0]) < 0.02)
+    along = rims.open & (np.abs(points[:, 0]) < 0.02)
     assert along.sum() > 50
-    assert open_rim(joined)[along].sum() < 0.4 * along.sum()
+    assert joined.open[along].sum() < 0.4 * along.sum()
     newly = joined.bridged & ~rims.bridged
     assert np.abs(points[newly, 0]).max() < 0.2
     assert (joined.reach[newly] >= spacing[newly]).all()
@@ -156,7 +152,7 @@ def test_an_opening_beside_a_sparser_part_is_bridged_if_that_one_bridges_it(widt
     points = np.concatenate([dense + random.uniform(-0.1, 0.1, dense.shape), sparse])
     after, before, _ = with_and_without_sparser_parts_joined(np.pad(points, ((0, 0), (0, 1))), UP)
     beside = (np.abs(points[:, 0]) < 0.5) & (np.abs(points[:, 1]) < 35)
-    assert open_rim(before)[beside].mean() > 0.9
+    assert before.open[beside].mean() > 0.9
     assert after.bridged[beside].mean() > 0.8 if joined else not after.bridged[beside].any()
 
 
@@ -164,7 +160,7 @@ def test_hardly_a_rim_of_evenly_random_samples_is_taken_for_one_of_a_denser_part
     turn, radius = random.uniform(0, 2 * np.pi, 20_000), np.sqrt(random.random(20_000))
     points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
     joined, rims, _ = with_and_without_sparser_parts_joined(points, UP)
-    assert open_rim(rims).sum() > 300
+    assert rims.open.sum() > 300
     assert (joined.bridged != rims.bridged).sum() < 5
 
 
