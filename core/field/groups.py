@@ -43,7 +43,7 @@ class Groups:
     @property
     def middles(self) -> np.ndarray:
         """(g,3) float64."""
-        return _middles(self.grid, self.corner, 2)
+        return middles_of(self.grid, self.corner, 2)
 
     def members(self, octant: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nodes of the groups at an `octant` of :data:`CORNERS`: their flat indices (m,), and which group each is
@@ -70,7 +70,7 @@ def groups_near(surface: LocalSurface, grid: Grid, width: float, progress: Progr
             if side < SIDE:
                 part = (part[:, None] + side * CORNERS.astype(np.int32)).reshape(-1, 3)
                 far = np.repeat(far, 8)
-            middle = _middles(grid, part, side)
+            middle = middles_of(grid, part, side)
             distance, sample = surface.tree.query(middle, workers=-1)
             kept = distance <= grid.spacing * (width + far + HALF * (side - 1))
             wide = np.flatnonzero(kept & (far > _SPARSE * side)) if side > 2 else []
@@ -109,6 +109,7 @@ def _blocks(surface, grid, width):
     return block, found.flat[block]
 
 
-def _middles(grid, corner, side):
-    """Positions of the middles of groups of `side`^3 nodes with lowest nodes (g,3)."""
+def middles_of(grid: Grid, corner: np.ndarray, side: int) -> np.ndarray:
+    """Positions of the middles of groups of `side`^3 nodes with lowest nodes (g,3) int, (g,3) float64; their nodes are
+    up to (side - 1) * HALF cells off."""
     return grid.origin + grid.spacing * (corner + 0.5 * (side - 1))

@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 
 from ...field.blocks import SIDE, Blocks, at_nodes, block_corners, each, inner_nodes, marked_nodes, put, regions
 from ...field.grid import Grid, node_strides
+from ...field.groups import HALF, middles_of
 from ...field.local_surface import LocalSurface
 from ...lookup import rows_of
 from ...parallel import over_rows
@@ -217,8 +218,8 @@ def lower_around(places: np.ndarray, near: np.ndarray | Blocks, grid: Grid, leve
         return
     tree, reach = KDTree(places), level + _MARGIN * grid.spacing
     corner = block_corners(near)
-    middle, radius = corner + 0.5 * (SIDE - 1), 0.5 * np.sqrt(3) * (SIDE - 1) * grid.spacing
-    away = tree.query(grid.origin + grid.spacing * middle, distance_upper_bound=reach + radius, workers=-1)[0]
+    room = reach + HALF * (SIDE - 1) * grid.spacing
+    away = tree.query(middles_of(grid, corner, SIDE), distance_upper_bound=room, workers=-1)[0]
     corner = corner[np.isfinite(away)]
     within = np.indices((SIDE,) * 3).reshape(3, -1).T
 
