@@ -75,9 +75,11 @@ class Blocks:
         return np.sort(np.ravel_multi_index(tuple(at.T), self.shape))
 
     def put(self, node: np.ndarray, values: np.ndarray) -> None:
-        """Set values at nodes (flat indices) of stored blocks, in place."""
+        """Set values at nodes (flat indices), one or one each, in place; blocks that are not stored stay as they are."""
         block, within = _split(node, self.shape, self.slot.shape)
-        self.stored.reshape(-1)[_NODES * self.slot.reshape(-1)[block].astype(np.int64) + within] = values
+        slot = self.slot.reshape(-1)[block].astype(np.int64)
+        held = slot >= 0
+        self.stored.reshape(-1)[_NODES * slot[held] + within[held]] = np.broadcast_to(values, node.shape)[held]
 
     def dense(self) -> np.ndarray:
         """The whole array, (nx,ny,nz)."""
@@ -176,7 +178,7 @@ def inner_nodes(array: "np.ndarray | Blocks") -> "np.ndarray | Blocks":
 
 
 def put(array: "np.ndarray | Blocks", node: np.ndarray, values: np.ndarray) -> None:
-    """Set values at nodes given by their flat index, in blocks stored ones, in place."""
+    """Set values at nodes given by their flat index, in place; in Blocks at those that are stored."""
     if isinstance(array, np.ndarray):
         array.reshape(-1)[node] = values
     else:

@@ -45,6 +45,11 @@ def ball(radius=6.0, centre=(9.3, 4.2, 14.1), limit=4.0):
     return np.minimum(np.abs(np.linalg.norm(x, axis=0) - radius), limit).astype(np.float32)
 
 
+def stored_only(blocks):
+    """The whole array, NaN where no block is stored."""
+    return replace(blocks, outer=np.full(blocks.slot.shape, np.nan)).dense()
+
+
 def test_only_blocks_that_vary_are_stored_and_nothing_is_lost():
     blocks = in_blocks(ball(), 4.0)
     assert 0 < len(blocks.stored) < 3 * 2 * 5
@@ -84,6 +89,14 @@ def test_values_are_put_where_they_belong():
     for array in (blocks, dense):
         put(array, node, np.arange(len(node)))
     np.testing.assert_array_equal(blocks.dense(), dense)
+
+
+def test_what_is_put_outside_of_stored_blocks_is_left_out():
+    blocks = in_blocks(ball(), 4.0)
+    before, outside = blocks.dense().copy(), np.flatnonzero(np.isnan(stored_only(blocks)))
+    assert len(outside)
+    put(blocks, outside, np.zeros(len(outside)))
+    np.testing.assert_array_equal(blocks.dense(), before)
 
 
 def test_merging_keeps_what_blocks_were_filled_with():
