@@ -30,6 +30,7 @@ _SHORT = 0.1  # cells from the edge of a band, where regions may start
 _ACROSS = 0.1  # share of what is seen of a region that has another across the surface, if they are its two sides
 _ROUND = 0.5  # cells of distance that regions grow at a time
 _AROUND, _MOST = 32, 0.6  # samples around a leak, and the share of them that must lie between two regions
+_WAITING = -1  # label of nodes that no region has reached
 _MARGIN = 2  # cells beyond the level where distances are lowered
 _BLOCKS = 128  # of nodes at a time
 
@@ -157,20 +158,25 @@ class _Field:
     def grown(self, apart: _Regions, level: float) -> _Regions:
         """The regions grown down to a lower level, over nodes far from the surface first."""
         labels, strides = apart.of_seen(), node_strides(self.grid.shape)
+        sides = np.concatenate([strides, -strides])
         free = self._nodes(level, np.inf, labels, False)
-        away = at_nodes(self.values, free)
+        away, before = at_nodes(self.values, free), np.inf
         for floor in [*np.arange(apart.level, level, -_ROUND * self.grid.spacing)[1:], level]:
-            now = free[away > floor]
-            while len(now):
-                found = np.zeros(len(now), np.int32)
-                for stride in (*strides, *-strides):
-                    found = np.where(found > 0, found, at_nodes(labels, now + stride))
-                if not found.any():
-                    break
-                put(labels, now[found > 0], found[found > 0])
-                now = now[found == 0]
-            left = at_nodes(labels, free) == 0
-            free, away = free[left], away[left]
+            now = free[(away > floor) & (away <= before)]
+            found, before = np.zeros(len(now), np.int32), floor
+            for stride in sides:
+                found = np.where(found > 0, found, at_nodes(labels, now + stride))
+            put(labels, now, np.where(found > 0, found, _WAITING))
+            fresh = now[found > 0]
+            while len(fresh):
+                own, reached = at_nodes(labels, fresh), []
+                for stride in sides:
+                    there = fresh - stride
+                    waits = at_nodes(labels, there) == _WAITING
+                    put(labels, there[waits], own[waits])
+                    reached.append(there[waits])
+                fresh = np.concatenate(reached)
+        labels = each(lambda label: np.maximum(label, 0), labels)
         return _Regions(level, labels, regions_beside(labels, self.surface, level, self.grid))
 
     def meetings(self, grown: _Regions, farthest: float) -> np.ndarray:
