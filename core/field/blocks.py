@@ -75,7 +75,7 @@ class Blocks:
         return np.sort(np.ravel_multi_index(tuple(at.T), self.shape))
 
     def put(self, node: np.ndarray, values: np.ndarray) -> None:
-        """Set values at nodes (flat indices), one or one each, in place; blocks that are not stored stay as they are."""
+        """Set values at nodes (flat indices), one or one each, in place; blocks that are not stored stay so."""
         block, within = _split(node, self.shape, self.slot.shape)
         slot = self.slot.reshape(-1)[block].astype(np.int64)
         held = slot >= 0

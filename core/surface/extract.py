@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks
 from ..field.grid import Grid
@@ -32,6 +33,7 @@ _SPARSEST = 5.0  # cells, median local spacing up to which single layers have th
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
+_SHOWN, _NEAR = 0.85, 3.0  # of the samples of sheets that pass through others, at least, and local spacings from a line
 _SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
@@ -142,31 +144,46 @@ class _Layers:
 
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one that turns off there, or has
-        handles, unless the shape is closed and its lines are known; sheets side by side have a torn one, but a closed
-        shape does not whose walls run close, or whose corners look like that."""
+        handles, unless their lines are known; sheets side by side have a torn one, but a closed shape does not whose
+        walls run close, or whose corners look like that."""
         cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
-        if self.meetings.share <= _FEW:
-            return True
-        if self.meetings.pass_through:
-            return bool(self.meetings.passing.any()) and self.sides.complete
-        return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
+        if self._pass_through:
+            if not self.meetings.passing.any():
+                return False
+            if self.sides.complete:
+                return True
+        few = self.meetings.share <= _FEW
+        return few or not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
+
+    @property
+    def _pass_through(self):
+        """Whether sheets pass through each other, at more than a few samples."""
+        return self.meetings.pass_through and self.meetings.share > _FEW
 
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
         surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
-        by side, or if it has none and its borders are elsewhere."""
+        by side, or if it has none and its borders are elsewhere. Where sheets pass through each other it has lines."""
         if self.sheet is not None:
-            return True
+            return self.sides.complete or not self._pass_through
         sheet = self.single[0]
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
-            return not self.meetings.side_by_side and self._at_meetings(sheet.vertices[line]) >= _SEEN
-        if pieces_touch(sheet, self.grid.spacing):
+            places = sheet.vertices[line]
+            shown = self._at_meetings(places) >= _SEEN and (not self._pass_through or self._passed_at(places) >= _SHOWN)
+            return shown and not self.meetings.side_by_side
+        if self._pass_through or pieces_touch(sheet, self.grid.spacing):
             return False
         return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT
+
+    def _passed_at(self, places):
+        """The share of the samples whose sheets pass through others that are close to places (m,3)."""
+        through = np.flatnonzero(self.meetings.through)
+        away = KDTree(places).query(self.local.points[through])[0]
+        return (away <= _NEAR * self.local.spacing[through]).mean()
 
     def _at_meetings(self, places):
         """The share of places (m,3), at least one, whose nearest samples are where sheets meet."""
@@ -194,10 +211,10 @@ def extract_surfaces(
     """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
     :func:`band_for` says, and the nodes near the surface.
 
-    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets that are not closed
-    pass through each other, or sheets run side by side, or meet where samples do not show it, or samples are sparse, or
-    so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets run close;
-    then it is extracted at an offset, see :mod:`.double.double_cover`.
+    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
+    other and it does not show where, or sheets run side by side, or meet where samples do not show it, or samples are
+    sparse, or so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets
+    run close; then it is extracted at an offset, see :mod:`.double.double_cover`.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

@@ -114,6 +114,12 @@ def figure_eight(count):
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.3 * np.sin(2 * turn)], axis=1)
 
 
+def umbrella(count):
+    """Random points on Whitney's umbrella, which passes through itself along a line that ends in a point."""
+    u, v = np.random.default_rng(0).uniform(-1, 1, (2, count))
+    return np.stack([u * v, u, v * v], axis=1)
+
+
 def leaves(count, pages):
     """Points on squares that meet in a line, at angles in degrees."""
     (x, y, _), turn = shapes.square(count // len(pages)).T, np.radians(pages)
@@ -259,7 +265,8 @@ def test_whatever_the_sheet_the_cover_is_manifold(seed):
         (shapes.sphere(20_000), False),
         (slab(1500), True),
         (figure_eight(3000), True),
-        (leaves(2400, [0, 90, 180, 270]), False),
+        (leaves(2400, [0, 90, 180, 270]), True),
+        (umbrella(3000), False),
     ],
     ids=[
         "torus",
@@ -273,12 +280,13 @@ def test_whatever_the_sheet_the_cover_is_manifold(seed):
         "close walls",
         "crossed",
         "crossed, open",
+        "umbrella",
     ],
 )
 def test_a_run_covers_the_single_layer_where_that_is_the_whole_surface(points, same):
-    """It is neither sparse nor dense, passes through itself only if it is closed and samples show the line, and where
-    sheets meet they do not run side by side and samples show that they meet, which those of sheets at the same angles
-    to each other do not."""
+    """It is neither sparse nor dense, shows the line where it passes through itself, all along that if it is open, and
+    where sheets meet they do not run side by side and samples show that they meet, which those of three sheets at the
+    same angles to each other do not."""
     run = reconstruct(points, Settings(resolution=48, surface="both"))
     assert is_of_sheet(run) == same
 
