@@ -34,6 +34,7 @@ _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer
 _FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
 _SHOWN, _NEAR = 0.85, 3.0  # of the samples of sheets that pass through others, at least, and local spacings from a line
+_CLEAN = 0.9975  # mean confidence of these samples, at least; noise of .05 cells leaves less
 _SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
@@ -144,8 +145,8 @@ class _Layers:
 
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one that turns off there, or has
-        handles, unless their lines are known; sheets side by side have a torn one, but a closed shape does not whose
-        walls run close, or whose corners look like that."""
+        handles, unless their lines are known, and samples free of noise where it is not closed; sheets side by side
+        have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
         cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
@@ -154,6 +155,8 @@ class _Layers:
                 return False
             if self.sides.complete:
                 return True
+            if self.local.confidence[self.meetings.through].mean() < _CLEAN:
+                return False
         few = self.meetings.share <= _FEW
         return few or not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
