@@ -22,11 +22,11 @@ _BAND = 4.0  # cells, the band that is advised at least
 # Fitted to 57 runs over 500 to 100,000 samples at resolutions of 64 to 256 and to 90 over 20 to 20,000, which held .4
 # to 1.5 times as much, 95 % of them less than 1.4, least sure for sparse samples: the Voronoi diagram by samples, the
 # field by nodes, the meshes by nodes and by squared cells of the surface. One is over before the next begins.
-_MEMORY = {"diagram": 35.0, "sample": 2.4e-3, "field": 43.0, "node": 31e-6, "meshes": 65.0, "held node": 12e-6}  # MiB
+_MEMORY = {"diagram": 35.0, "sample": 2.4e-3, "field": 43.0, "node": 31e-6, "meshes": 65.0, "held node": 10e-6}  # MiB
 _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
 _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
-_MESHES = {"none": 0.0, "double": 3.6e-3, "single": 3.2e-3, "both": 5e-3, "signed": 4.5e-3}
+_MESHES = {"none": 0.0, "double": 3.3e-3, "single": 3.2e-3, "both": 5e-3, "signed": 4.5e-3}
 _SPARSE = 25.0  # squared cells of the surface for each sample; a single layer is often torn then, and a cover looked at
 
 # The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
