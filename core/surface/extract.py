@@ -31,7 +31,6 @@ _BETTER = 0.5  # times that misfit, below which the double cover is taken
 _OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples that are, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
-_FEW = 0.005  # of the samples, at meetings of sheets: as few may be chance
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
 _SHOWN, _NEAR = 0.85, 3.0  # of the samples of sheets that pass through others, at least, and local spacings from a line
 _CLEAN = 0.9975  # mean confidence of these samples, at least; noise of .05 cells leaves less
@@ -150,35 +149,32 @@ class _Layers:
         cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
-        if self._pass_through:
+        if self.meetings.few:
+            return True
+        if self.meetings.pass_through:
             if not self.meetings.passing.any():
                 return False
             if self.sides.complete:
                 return True
             if self.local.confidence[self.meetings.through].mean() < _CLEAN:
                 return False
-        few = self.meetings.share <= _FEW
-        return few or not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
-
-    @property
-    def _pass_through(self):
-        """Whether sheets pass through each other, at more than a few samples."""
-        return self.meetings.pass_through and self.meetings.share > _FEW
+        return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
         surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
         by side, or if it has none and its borders are elsewhere. Where sheets pass through each other it has lines."""
         if self.sheet is not None:
-            return self.sides.complete or not self._pass_through
+            return self.sides.complete or not self.meetings.pass_through
         sheet = self.single[0]
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
             places = sheet.vertices[line]
-            shown = self._at_meetings(places) >= _SEEN and (not self._pass_through or self._passed_at(places) >= _SHOWN)
-            return shown and not self.meetings.side_by_side
-        if self._pass_through or pieces_touch(sheet, self.grid.spacing):
+            if self.meetings.pass_through and self._passed_at(places) < _SHOWN:
+                return False
+            return not self.meetings.side_by_side and self._at_meetings(places) >= _SEEN
+        if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
             return False
         return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT
 

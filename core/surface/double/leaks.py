@@ -157,20 +157,20 @@ class _Field:
 
     def grown(self, apart: _Regions, level: float) -> _Regions:
         """The regions grown down to a lower level, over nodes far from the surface first."""
-        labels, strides = apart.of_seen(), node_strides(self.grid.shape)
-        sides = np.concatenate([strides, -strides])
+        labels, ahead = apart.of_seen(), node_strides(self.grid.shape)
+        strides = np.concatenate([ahead, -ahead])
         free = self._nodes(level, np.inf, labels, False)
         away, before = at_nodes(self.values, free), np.inf
         for floor in [*np.arange(apart.level, level, -_ROUND * self.grid.spacing)[1:], level]:
             now = free[(away > floor) & (away <= before)]
             found, before = np.zeros(len(now), np.int32), floor
-            for stride in sides:
+            for stride in strides:
                 found = np.where(found > 0, found, at_nodes(labels, now + stride))
             put(labels, now, np.where(found > 0, found, _WAITING))
             fresh = now[found > 0]
             while len(fresh):
                 own, reached = at_nodes(labels, fresh), []
-                for stride in sides:
+                for stride in strides:
                     there = fresh - stride
                     waits = at_nodes(labels, there) == _WAITING
                     put(labels, there[waits], own[waits])
