@@ -4,7 +4,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..field.blocks import Blocks
 from ..field.grid import Grid
@@ -32,8 +31,7 @@ _OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples th
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
-_SHOWN, _NEAR = 0.85, 3.0  # of the samples of sheets that pass through others, at least, and local spacings from a line
-_CLEAN = 0.9975  # mean confidence of these samples, at least; noise of .05 cells leaves less
+_CLEAN = 0.9975  # mean confidence of samples whose sheets pass through others, at least; noise of .05 cells leaves less
 _SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
@@ -170,19 +168,11 @@ class _Layers:
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
-            places = sheet.vertices[line]
-            if self.meetings.pass_through and self._passed_at(places) < _SHOWN:
-                return False
-            return not self.meetings.side_by_side and self._at_meetings(places) >= _SEEN
+            shown = self.meetings.pass_through or self._at_meetings(sheet.vertices[line]) >= _SEEN
+            return shown and not self.meetings.side_by_side
         if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
             return False
         return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT
-
-    def _passed_at(self, places):
-        """The share of the samples whose sheets pass through others that are close to places (m,3)."""
-        through = np.flatnonzero(self.meetings.through)
-        away = KDTree(places).query(self.local.points[through])[0]
-        return (away <= _NEAR * self.local.spacing[through]).mean()
 
     def _at_meetings(self, places):
         """The share of places (m,3), at least one, whose nearest samples are where sheets meet."""

@@ -21,8 +21,9 @@ from ...progress import Progress
 NEIGHBOURS = 32
 _LINKED = 0.8  # least confidence of samples that link others
 _SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
-_WIDER, _STRAIGHT = 60, 0.5  # samples that a sheet is followed over, least membership of them
-_PAST = 1.0  # local spacings that a sheet goes on, on either side of the other
+_WIDER, _CLOSE = 120, 60  # samples among which a sheet is followed, and close by
+_STRAIGHT, _FAR = 0.5, 4.0  # least membership of those it is followed over; local spacings, up to where
+_PAST = 1.0  # local spacings along itself that a sheet goes on, on either side of the other
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 _WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
@@ -70,7 +71,7 @@ class Meetings:
 def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
     """Where sheets meet, cross or run close, from the samples alone."""
     progress, n = Progress.of(progress), len(surface.points)
-    nearest, member = _members(surface, np.arange(n), NEIGHBOURS + 1, progress)
+    nearest, member = _members(surface, min(NEIGHBOURS + 1, n), progress)
     alike = member > MEMBER
     trusted = surface.confidence >= TRUSTED
     unlike = ~alike & trusted[nearest] & trusted[:, None]
@@ -81,11 +82,11 @@ def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
     apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
     cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
     askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
-    past = _goes_past(i[askew], j[askew], surface)
+    past, close = _goes_past(i[askew], j[askew], surface)
     apart[askew] = past > 0
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
     at = _grown(*((found >= _LEAST) & (found >= share * pairs) for share in (_SHARE, _WEAK)), nearest)
-    through = _among(n, i[askew][past == 2], j[askew][past == 2])
+    through = _among(n, i[askew][close == 2], j[askew][close == 2])
     side_by_side = apart & (cosine > _SIDE_BY_SIDE)
     beside = at & _among(n, i[side_by_side], j[side_by_side])
     return Meetings(at, through, beside, _of_lines(through, nearest)[nearest[:, :_PASSING]].any(axis=1))
@@ -138,41 +139,60 @@ def _linked(i, j, nearest, alike, sure):
 
 
 def _goes_past(i, j, surface):
-    """Of how many of two samples, 0 to 2, the sheet has samples well on both sides of the other's tangent plane."""
+    """Of how many of two samples, 0 to 2, the sheet goes on past the other's tangent plane, well to both sides of it,
+    (m,); and of how many it does so close by, (m,). None where they run side by side."""
     n = len(surface.points)
     pair, number = numbered(np.minimum(i, j) * n + np.maximum(i, j))
-    ends, past = np.stack(np.divmod(pair, n)), np.zeros(len(pair), np.int8)
+    ends, past = np.stack(np.divmod(pair, n)), np.zeros((2, len(pair)), np.int8)
     every, row = numbered(ends)
-    wide, member = _members(surface, every, _WIDER, Progress())
-    member = (member > _STRAIGHT) & (surface.confidence[wide] >= _LINKED)
+    followed = _followed(every, surface)
     points, normals = surface.columns.points, surface.normals.T
 
     def look(part):
         for one, other in ((0, 1), (1, 0)):
-            at, on = row[one, part], ends[other, part]
-            near, known = wide[at], member[at]
+            own, on = ends[one, part], ends[other, part]
+            near = followed[row[one, part]]
             away = [x.take(near) - x.take(on)[:, None] for x in points]
             height = dots(away, [axis.take(on)[:, None] for axis in normals])
-            limit = _PAST * surface.spacing[ends[one, part]]
-            above = np.where(known, height, -np.inf).max(axis=1) > limit
-            past[part] += above & (np.where(known, height, np.inf).min(axis=1) < -limit)
+            cosine = np.abs(row_dots(surface.normals[own], surface.normals[on]))
+            along = _PAST * surface.spacing[own]
+            limit = np.where(cosine > _SIDE_BY_SIDE, np.inf, along * np.sqrt(1 - np.minimum(cosine, 1) ** 2))
+            above, below = np.where(near < 0, 0, height), np.where(near < 0, 0, -height)
+            for which, some in enumerate((_WIDER, _CLOSE)):
+                both = np.minimum(above[:, :some].max(axis=1), below[:, :some].max(axis=1))
+                past[which, part] += both > limit
 
     over_rows(look, len(pair), _CHUNK)
-    return past[number]
+    return past[:, number]
 
 
-def _members(surface, own, k, progress):
-    """The k samples nearest to the samples `own` (m,), and how surely each lies on one sheet with them, (m,k)."""
-    k = min(k, len(surface.points))
-    nearest, member = np.empty((len(own), k), np.int64), np.empty((len(own), k), np.float32)
+def _followed(own, surface):
+    """The samples that the sheets of samples `own` (m,) are followed over, nearest first, (m,k) int32; -1 for others
+    around."""
+    followed = np.empty((len(own), min(_WIDER, len(surface.points))), np.int32)
 
     def look(part):
-        near = surface.tree.query(surface.points[own[part]], k=k)[1]
-        points, normals = surface.columns.points, surface.normals.T
-        between = np.stack([x.take(near) - x.take(own[part])[:, None] for x in points])
-        own_normals, theirs = normals[:, own[part], None], np.stack([column.take(near) for column in normals])
-        return near, membership(between, dots(between, own_normals), dots(between, theirs))
+        away, near, member = _around(own[part], followed.shape[1], surface)
+        sure = (member > _STRAIGHT) & (surface.confidence[near] >= _LINKED)
+        followed[part] = np.where(sure & (away <= _FAR * surface.spacing[own[part], None]), near, -1)
 
-    for part, found in in_order(look, even_chunks(len(own), _CHUNK, progress)):
-        nearest[part], member[part] = found
+    over_rows(look, len(own), _CHUNK)
+    return followed
+
+
+def _members(surface, k, progress):
+    """The k samples nearest to each, and how surely each of them lies on one sheet with it, (n,k)."""
+    n = len(surface.points)
+    nearest, member = np.empty((n, k), np.int64), np.empty((n, k), np.float32)
+    for part, found in in_order(lambda part: _around(part, k, surface), even_chunks(n, _CHUNK, progress)):
+        nearest[part], member[part] = found[1:]
     return nearest, member
+
+
+def _around(own, k, surface):
+    """Distances to the k samples nearest to some, which they are, and how surely each lies on one sheet, (m,k)."""
+    away, near = surface.tree.query(surface.points[own], k=k)
+    points, normals = surface.columns.points, surface.normals.T
+    between = np.stack([x.take(near) - x[own, None] for x in points])
+    own_normals, theirs = normals[:, own, None], np.stack([column.take(near) for column in normals])
+    return away, near, membership(between, dots(between, own_normals), dots(between, theirs))

@@ -12,7 +12,7 @@ from ..meshing.planes import to_planes
 
 _RINGS = 3  # of vertices around a line, whose sheets are known there
 _NEAR = 1.2  # cells, from a vertex to a sheet that counts
-_STEEP = 0.8  # largest |n . n'| of sheets that meet; others run side by side
+_STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
 _STIFFNESS, _ROUNDS = 0.02, 2
 
 

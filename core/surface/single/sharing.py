@@ -14,7 +14,7 @@ from ...lookup import numbered
 from ..edges.crossings import Crossings
 
 _BENT, _OFF = 0.3, 0.05  # crossings of a sheet are off each other's planes by this share of their distance, and cells
-_STEEP = 0.7  # |n . n'| of sheets that meet
+_STEEP = 0.92  # |n . n'| of sheets that meet
 
 
 def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, np.ndarray]:

@@ -78,12 +78,12 @@ def sheet_of_crossings(
     """Any surface as one sheet by :func:`dual_contour`, with edges of several faces where sheets meet.
 
     Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
-    either side, and may have handles where samples are sparse; so it is taken only if the dual contour, which shows the
-    line, cannot be wound alike wherever it has two faces, and does not end along the line, as where sheets meet. Where
-    sheets run side by side this may be torn, too; then it is one side of the `cover`, a function that gives the double
-    cover (see :func:`one_side`). Creases may look like sheets that meet for some cells; so what lies between two sides
-    is taken in place of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines
-    and no borders in their place.
+    either side, may have handles where samples are sparse, and tears where the line ends; so it is taken only if
+    samples do not show the line, and the dual contour cannot be wound alike wherever it has two faces, and does not end
+    along the line, as where sheets meet. Where sheets run side by side this may be torn, too; then it is one side of
+    the `cover`, a function that gives the double cover (see :func:`one_side`). Creases may look like sheets that meet
+    for some cells; so what lies between two sides is taken in place of a dual contour all of whose lines are short,
+    too, if it is wound alike, and has no such lines and no borders in their place.
 
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
@@ -95,7 +95,8 @@ def sheet_of_crossings(
         return sheet, unoriented
     lines = _lines(sheet)
     chance = not (unoriented or meetings.side_by_side) and _are_short(lines, grid)
-    if not (unoriented or chance):
+    shown = passing.any() and not meetings.side_by_side
+    if not chance and (shown or not unoriented):
         return sheet, unoriented
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
     if signed is None:

@@ -15,11 +15,12 @@ def fitted(points, normals):
     return fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
 
 
-def crossed():
-    """Two squares that cross along the y axis, z = 0 and x = 0."""
-    flat = shapes.square(1200)
-    normals = np.repeat(np.eye(3)[[2, 0]], len(flat), axis=0)
-    return fitted(np.concatenate([flat, flat[:, [2, 1, 0]] + np.array([0, 0, 1e-3])]), normals)
+def crossed(degrees=90):
+    """Two squares that cross along the y axis at some angle, z = 0 and, at a right one, x = 0."""
+    flat, c, s = shapes.square(1200), np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    normals = np.repeat([[0, 0, 1], [s, 0, -c]], len(flat), axis=0)
+    other = flat[:, :1] * [c, 0, s] + flat[:, 1:2] * [0, 1, 0]
+    return fitted(np.concatenate([flat, other + np.array([0, 0, 1e-3])]), normals)
 
 
 def ended(turned):
@@ -77,9 +78,9 @@ def test_a_sheet_goes_past_another_where_it_has_samples_on_both_sides(turned):
     i, j = (each.reshape(-1) for each in np.meshgrid(near, near))
     close = np.linalg.norm(surface.points[i] - surface.points[j], axis=1) < 2 * np.median(surface.spacing)
     same = surface.normals[i, 2] == surface.normals[j, 2]
-    found = _goes_past(i, j, surface)
-    assert (found[~same & close] == 1).mean() > 0.9
-    assert not found[same].any()
+    for found in _goes_past(i, j, surface):
+        assert (found[~same & close] == 1).mean() > 0.9
+        assert not found[same].any()
     meet = find_meetings(surface)
     assert meet.at.sum() > 50
     assert meet.through.sum() < 0.05 * meet.at.sum()
@@ -99,6 +100,19 @@ def test_crossing_squares_meet_along_their_line_only():
     assert meet.pass_through
     assert meet.passing[(away < 1.5) & inside].all()
     assert not meet.passing[away > 6].any()
+
+
+@pytest.mark.parametrize("degrees", [60, 45, 35])
+def test_squares_that_cross_askew_meet_along_their_line_only(degrees):
+    """Followed over 60 samples in place of 120, neither went far enough past the other at 35 degrees."""
+    surface = crossed(degrees)
+    away = np.hypot(surface.points[:, 0], surface.points[:, 2]) / np.median(surface.spacing)
+    inside = np.abs(surface.points[:, 1]) < 0.8
+    meet = find_meetings(surface)
+    assert meet.at[(away < 1.5) & inside].all()
+    assert not meet.at[away > 9].any()
+    assert meet.through[away < 3].sum() == meet.through.sum() > 20
+    assert not meet.side_by_side
 
 
 def test_samples_that_are_few_of_those_around_them_show_no_line():

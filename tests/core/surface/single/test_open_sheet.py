@@ -70,17 +70,38 @@ def test_a_creased_scan_is_wound_alike():
     assert away.max() < 3  # behind the ears, in slits narrower than two cells
 
 
-def test_sheets_that_pass_through_each_other_askew_are_wound_alike():
-    """Two squares at 56 degrees, whose dual contour cannot be."""
-    random, turn = np.random.default_rng(10), shapes.random_rotation(10)
+@pytest.mark.parametrize(("degrees", "seed"), [(56, 1), (56, 10), (40, 1), (40, 3)])
+def test_sheets_that_pass_through_each_other_askew_meet_in_a_line(degrees, seed):
+    """Two squares. At 40 degrees walls of up to two cells stood between them beside the line, with 20 tunnels and more;
+    at 56 they turned off there."""
+    random, turn = np.random.default_rng(seed), shapes.random_rotation(seed)
     flat, other = random.uniform(-1, 1, (2, 1500, 3))
-    flat[:, 2], other[:, 0] = 0, 0
-    c, s = np.cos(0.6), np.sin(0.6)
-    points = np.concatenate([flat, other @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])]) @ turn.T
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    flat[:, 2], other = 0, other[:, :1] * [c, 0, s] + other[:, 1:2] * [0, 1, 0]
+    points = np.concatenate([flat, other]) @ turn.T
     run = single(points, resolution=128)
     assert run.report["warnings"] == []
-    assert run.sheet.edge_counts()[1].max() == 2
     assert KDTree(run.sheet.vertices).query(points)[0].max() < 1.5 * run.field.spacing
+    edges, count = run.sheet.edge_counts()
+    line = run.sheet.vertices[np.unique(edges[count > 2])] @ turn / run.field.spacing
+    assert np.hypot(line[:, 0], line[:, 2]).max() < 1
+    assert np.histogram(line[:, 1], np.linspace(-40, 40, 21))[0].all()
+    assert -8 <= shapes.euler(run.sheet) <= 1
+    middle = run.sheet.vertices[run.sheet.faces].mean(axis=1) @ turn / run.field.spacing
+    off = np.minimum(np.abs(middle[:, 2]), np.abs(middle @ [s, 0, -c]))
+    assert np.percentile(off, 99.9) < 0.3
+
+
+def test_a_pinched_sheet_has_its_line():
+    """Whitney's umbrella: a sheet that turned off on either side of the line was torn where that ends."""
+    random = np.random.default_rng(1)
+    u, v = random.uniform(-1, 1, (2, 6000))
+    run = single(np.column_stack([u * v, u, v**2]))
+    edges, count = run.sheet.edge_counts()
+    line = run.sheet.vertices[np.unique(edges[count > 2])] / run.field.spacing
+    assert np.hypot(line[:, 0], line[:, 1]).max() < 1
+    top = 1 / run.field.spacing
+    assert np.histogram(line[:, 2], np.linspace(2, top - 2, 11))[0].all()
 
 
 @pytest.mark.parametrize("n", [1500, 8000])
