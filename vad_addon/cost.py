@@ -10,9 +10,11 @@ from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
 from ..core.points import local_spacing, prepare_samples
+from ..core.progress import Progress
 from ..core.settings import WHOLE_BOX, Settings, options
 from . import points_in, status
 from .properties import chosen, settings_from
+from .run import percentage
 
 
 @dataclass(frozen=True)
@@ -26,11 +28,12 @@ class Points:
     noisy: bool
 
     @classmethod
-    def of(cls, points: np.ndarray) -> "Points":
+    def of(cls, points: np.ndarray, progress=None) -> "Points":
         """Those of (n,3) points. Raises :class:`InputError` for points that cannot be used."""
-        samples = prepare_samples(points)
+        progress = Progress.of(progress)
+        samples = prepare_samples(points, progress.part(0.0, 0.5)).in_spatial_order()
         corners = np.stack([samples.points.min(axis=0), samples.points.max(axis=0)])
-        spacing = local_spacing(samples.points)
+        spacing = local_spacing(samples.points, progress.part(0.5, 0.9))
         return cls(corners, spacing, samples.scale, looks_noisy(samples.points, spacing))
 
     def suits(self) -> int:
@@ -101,7 +104,8 @@ class VAD_OT_estimate(bpy.types.Operator):
         try:
             stored = context.scene.vad
             source = points_in.gather(points_in.sources(context), context, stored.selected_only)
-            _asked = _selected(context), Points.of(source.points)
+            with percentage(context.window_manager) as progress:
+                _asked = _selected(context), Points.of(source.points, progress)
             _told.clear()
             settings_from(stored)
         except VADError as error:

@@ -99,7 +99,7 @@ class Run:
             self.layout.prop(self, name)
 
     def _compute(self, context, task):
-        with _exchange_folder() as folder, _cursor(context.window_manager) as progress:
+        with _exchange_folder() as folder, percentage(context.window_manager) as progress:
             self.deliver(context, context.scene, outcome.compute(task, folder, progress))
 
     def _fail(self, error):
@@ -149,7 +149,7 @@ def _exchange_folder():
 
 
 @contextmanager
-def _cursor(window_manager):
+def percentage(window_manager: bpy.types.WindowManager):
     """A progress callback that turns the mouse cursor into a percentage."""
     window_manager.progress_begin(0, 100)
     try:
