@@ -141,19 +141,17 @@ class _Layers:
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
 
     def _may_be_sheet(self):
-        """Whether to look for a single layer. Sheets that pass through each other have one that turns off there, or has
-        handles, unless their lines are known, and samples free of noise where it is not closed; sheets side by side
-        have a torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
+        """Whether to look for a single layer. Sheets that pass through each other have one with handles, unless their
+        lines are known where it is closed, and samples are free of noise where it is not; sheets side by side have a
+        torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
         cells = self.local.spacing_in_cells(self.grid)
         if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
             return False
         if self.meetings.few:
             return True
         if self.meetings.pass_through:
-            if not self.meetings.passing.any():
-                return False
             if self.sides.complete:
-                return True
+                return bool(self.meetings.passing.any())
             if self.local.confidence[self.meetings.through].mean() < _CLEAN:
                 return False
         return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
@@ -168,7 +166,7 @@ class _Layers:
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
-            shown = self.meetings.pass_through or self._at_meetings(sheet.vertices[line]) >= _SEEN
+            shown = self.meetings.passing.any() or self._at_meetings(sheet.vertices[line]) >= _SEEN
             return shown and not self.meetings.side_by_side
         if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
             return False

@@ -21,7 +21,8 @@ from ...progress import Progress
 NEIGHBOURS = 32
 _LINKED = 0.8  # least confidence of samples that link others
 _SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
-_WIDER, _CLOSE = 120, 60  # samples among which a sheet is followed, and close by
+_ASKEW = float(np.sqrt(1 - _SIDE_BY_SIDE**2))  # least sine between others
+_WIDER, _CLOSE = 120, 60  # samples among which a sheet is followed, and close by where it meets another squarely
 _STRAIGHT, _FAR = 0.5, 4.0  # least membership of those it is followed over; local spacings, up to where
 _PAST = 1.0  # local spacings along itself that a sheet goes on, on either side of the other
 _CHUNK = 8192  # samples
@@ -140,13 +141,14 @@ def _linked(i, j, nearest, alike, sure):
 
 def _goes_past(i, j, surface):
     """Of how many of two samples, 0 to 2, the sheet goes on past the other's tangent plane, well to both sides of it,
-    (m,); and of how many it does so close by, (m,). None where they run side by side."""
+    (m,); and of how many it does so close by, (m,). None where they run side by side. The smaller their angle, the
+    farther from the line are the nearest samples that are unlike, so more count as close."""
     n = len(surface.points)
     pair, number = numbered(np.minimum(i, j) * n + np.maximum(i, j))
     ends, past = np.stack(np.divmod(pair, n)), np.zeros((2, len(pair)), np.int8)
     every, row = numbered(ends)
     followed = _followed(every, surface)
-    points, normals = surface.columns.points, surface.normals.T
+    column, points, normals = np.arange(followed.shape[1]), surface.columns.points, surface.normals.T
 
     def look(part):
         for one, other in ((0, 1), (1, 0)):
@@ -154,13 +156,12 @@ def _goes_past(i, j, surface):
             near = followed[row[one, part]]
             away = [x.take(near) - x.take(on)[:, None] for x in points]
             height = dots(away, [axis.take(on)[:, None] for axis in normals])
-            cosine = np.abs(row_dots(surface.normals[own], surface.normals[on]))
-            along = _PAST * surface.spacing[own]
-            limit = np.where(cosine > _SIDE_BY_SIDE, np.inf, along * np.sqrt(1 - np.minimum(cosine, 1) ** 2))
-            above, below = np.where(near < 0, 0, height), np.where(near < 0, 0, -height)
-            for which, some in enumerate((_WIDER, _CLOSE)):
-                both = np.minimum(above[:, :some].max(axis=1), below[:, :some].max(axis=1))
-                past[which, part] += both > limit
+            sine = np.sqrt(1 - np.minimum(1, row_dots(surface.normals[own], surface.normals[on]) ** 2))
+            limit = np.where(sine < _ASKEW, np.inf, _PAST * surface.spacing[own] * sine)
+            close = column < _CLOSE / np.maximum(sine, _ASKEW)[:, None]
+            for which, known in enumerate((near >= 0, (near >= 0) & close)):
+                above, below = (np.where(known, side, 0).max(axis=1) for side in (height, -height))
+                past[which, part] += np.minimum(above, below) > limit
 
     over_rows(look, len(pair), _CHUNK)
     return past[:, number]
