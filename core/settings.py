@@ -56,9 +56,9 @@ class Settings:
     offset: float = _option(
         1.0,
         "Distance at which the two layers of the double cover are first extracted, before they are pulled onto the "
-        "surface, where they are not the two sides of a single layer: where open sheets cross, or sheets run side by "
-        "side, or points are over five cells apart; at more where they are over three. Larger tolerates rougher "
-        "fields, smaller separates closer sheets",
+        "surface, where they are not the two sides of a single layer: where points do not show where sheets "
+        "cross, or sheets run side by side, or points are over five cells apart; at more where they are over three. "
+        "Larger tolerates rougher fields, smaller separates closer sheets",
         limits=(0.5, 4.0),
         unit="cells",
     )

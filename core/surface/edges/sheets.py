@@ -21,6 +21,7 @@ REACH = 1.6  # cells, from a node to a sheet that counts
 _SIDE_BY_SIDE, _LIKELY = 0.9, 0.6  # least |n . n'| and confidence of samples of such sheets beside the first
 _ROUNDS = 1
 _SAME_ANGLE, _SAME_FOOT = 0.9, (0.25, 0.1)  # cosine; cells or local spacings, whichever is more
+STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
 ALIKE = 0.6  # least cosine between the axes of one sheet at neighbouring nodes
 _BENT, _OFF = 0.35, 0.1  # its feet are off each other's plane by this share of their distance and this many cells
 

@@ -6,13 +6,12 @@ import numpy as np
 
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots, symmetric
-from ..edges.sheets import Sheets, sheets_near
+from ..edges.sheets import STEEP, Sheets, sheets_near
 from ..mesh import Mesh
 from ..meshing.planes import to_planes
 
 _RINGS = 3  # of vertices around a line, whose sheets are known there
 _NEAR = 1.2  # cells, from a vertex to a sheet that counts
-_STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
 _STIFFNESS, _ROUNDS = 0.02, 2
 
 
@@ -30,7 +29,7 @@ def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None
     vertices = mesh.vertices.copy()
     sheets = sheets_near(surface, vertices[np.append(line, around)], towards, cell, progress)
     sheets = sheets[(np.abs(sheets.tau) <= _NEAR * cell) & (sheets.node < len(line))]
-    meet = _least_cosine(sheets, len(line)) < _STEEP
+    meet = _least_cosine(sheets, len(line)) < STEEP
     for _ in range(_ROUNDS):
         step = to_planes(vertices[line], sheets.node, sheets.foot, sheets.axis, _STIFFNESS)
         vertices[line[meet]] += step[meet]

@@ -12,9 +12,9 @@ from ...field.grid import Grid, node_strides
 from ...linalg import row_dots
 from ...lookup import numbered
 from ..edges.crossings import Crossings
+from ..edges.sheets import STEEP
 
 _BENT, _OFF = 0.3, 0.05  # crossings of a sheet are off each other's planes by this share of their distance, and cells
-_STEEP = 0.92  # |n . n'| of sheets that meet
 
 
 def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, np.ndarray]:
@@ -66,7 +66,7 @@ def _compare(crossings, a, b, cell):
         np.where(known[1], crossings.normal[b], crossings.normal[a]),
     )
     off = np.maximum(*(np.abs(row_dots(gap, normal)) for normal in normals))
-    level = np.abs(row_dots(*normals)) > _STEEP
+    level = np.abs(row_dots(*normals)) > STEEP
     meet = ~level & (known[0] & known[1])[:, 0]
     return (off <= _BENT * length + _OFF * cell) & ~meet, meet
 

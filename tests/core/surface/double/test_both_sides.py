@@ -286,9 +286,9 @@ def test_whatever_the_sheet_the_cover_is_manifold(seed):
     ],
 )
 def test_a_run_covers_the_single_layer_where_that_is_the_whole_surface(points, same):
-    """It is neither sparse nor dense, shows the line where it passes through itself, all along and without noise if it
-    is open, and where sheets meet they do not run side by side and samples show that they meet, which those of three
-    sheets at the same angles to each other do not."""
+    """It is neither sparse nor dense, shows the line where it passes through itself, without noise if it is open, and
+    where sheets meet they do not run side by side and samples show that they meet, which those of three sheets at the
+    same angles to each other do not."""
     run = reconstruct(points, Settings(resolution=48, surface="both"))
     assert is_of_sheet(run) == same
 
