@@ -49,6 +49,7 @@ def test_stages_in_a_row_are_the_whole_run(monkeypatch):
     assert np.abs(found["values"] - whole.field.values).mean() < 0.02 * whole.field.spacing
     for mesh, expected in ((found["cover"], whole.surface), (found["sheet"], whole.sheet)):
         assert abs(len(mesh.faces) - len(expected.faces)) < 0.02 * len(expected.faces)
+    assert len(found["both"].faces) >= 2 * len(found["sheet"].faces)
 
 
 def test_all_public_names_are_there_and_no_others():

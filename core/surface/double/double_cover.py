@@ -16,12 +16,13 @@ from ..meshing.corners import into_corners
 from ..meshing.evening import evened
 from ..meshing.isosurface import isosurface
 from ..meshing.pieces import pieces_with_samples
+from ..meshing.slivers import without_slivers
 from ..meshing.triangles import mesh_of
 from .layers import laid_apart
 from .leaks import lower_around, shut_leaks
 from .pinholes import find_pinholes
 from .ridges import raise_ridges
-from .spanning import spanned, spanning_vertices
+from .spanning import spanned, spanning_vertices, stretched_vertices
 
 CLAMP = 2.0  # cells beyond the level; farther nodes do not matter and are made background
 SPARSE = 3.0  # cells, median local spacing above which the iso-surface is taken further off
@@ -58,8 +59,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     to its foot point on the local surface, twice, with its faces made even in between, then drawn into concave corners,
     instead of descending a mesh energy. The first time, the steps to the nodes around it tell the way, where they can.
     The mesh is closed and each of its edges has two faces, wound so that normals point away from the surface on either
-    side; an open sheet gives one piece, a closed one an outer and an inner piece. Flattened against the surface, rims
-    have thin triangles.
+    side; an open sheet gives one piece, a closed one an outer and an inner piece.
 
     At last each layer is taken to its own side of the surface, see :mod:`layers`, which adds as much error again as
     faces have that are chords of a curved surface. On samples denser than two thirds of a cell that is most of what
@@ -68,10 +68,12 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
 
     Gaps between sheets, and wedges, are open down to little more than two levels, see :mod:`ridges`.
     Where a closed surface would leak through an opening between samples, or an open sheet has a pinhole, this is shut
-    and spanned smoothly, see :mod:`leaks`, :mod:`pinholes` and :mod:`spanning`.
+    and spanned smoothly, see :mod:`leaks`, :mod:`pinholes` and :mod:`spanning`; so are faces that are drawn out between
+    sheets.
 
-    Where OpenVDB is found all its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
-    Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses.
+    Where OpenVDB is found most of its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
+    Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses; it is
+    flattened against rims, which leaves slivers that are taken out, see :mod:`..meshing.slivers`.
     """
     progress = Progress.of(progress)
     level = np.float32(level_for(surface, grid, offset) * grid.spacing)
@@ -91,8 +93,9 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = evened(_moved(vertices, step, level), faces, past_rim)
     vertices = _moved(vertices, surface.project(vertices, progress.part(0.3, 0.7)).step, level)
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
+    loose |= stretched_vertices(vertices, faces, surface, grid.spacing)
     vertices = spanned(vertices, faces, loose)
-    mesh = mesh_of(vertices, faces)
+    mesh = without_slivers(mesh_of(vertices, faces), grid.spacing)
     progress(0.8)
     dense = surface.spacing_in_cells(grid) < DENSE
     mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))

@@ -1,14 +1,17 @@
-"""Parts of a mesh that span openings, where there is no surface to pull vertices onto."""
+"""Parts of a mesh where there is no surface to pull vertices onto: over openings, and from one sheet to the next."""
 
 import numpy as np
 from scipy.sparse import coo_matrix, identity
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import KDTree
 
+from ...field.local_surface import LocalSurface
 from ...linalg import symmetric
 from ..mesh import edges_of
 
 _BESIDE = 2.0  # levels from an opening that is shut, within which vertices on rims span it, too
+_STRETCHED = 3.0  # cells, length of edges; those of the iso-surface have 1.4 at most
+_OFF = 0.5  # cells from the surface, of their middles
 _HELD = 1e-6  # weight of where a vertex is, beside that of a smooth surface
 
 
@@ -25,6 +28,19 @@ def spanning_vertices(vertices, step, past_rim, places, level: float) -> np.ndar
     farthest = max(length.max(initial=0.0), _BESIDE * level)
     away = KDTree(places).query(vertices, distance_upper_bound=farthest, workers=-1)[0]
     return (away < length) | (past_rim & (away < _BESIDE * level))
+
+
+def stretched_vertices(vertices, faces, surface: LocalSurface, cell: float) -> np.ndarray:
+    """Which vertices (v,3) of triangles or quads (f,k), each on a foot point, are the ends of edges much longer than
+    those of the grid whose middles lie off the surface, (v,) bool: where the iso-surface joins sheets, its faces are
+    drawn out into spikes from one to the other."""
+    (tail, head), _ = edges_of(faces, len(vertices))
+    far = np.flatnonzero(((vertices[tail] - vertices[head]) ** 2).sum(axis=1) > (_STRETCHED * cell) ** 2)
+    middle = 0.5 * (vertices[tail[far]] + vertices[head[far]])
+    far = far[surface.project(middle).distance > _OFF * cell]
+    found = np.zeros(len(vertices), bool)
+    found[tail[far]] = found[head[far]] = True
+    return found
 
 
 def spanned(vertices: np.ndarray, faces: np.ndarray, loose: np.ndarray) -> np.ndarray:

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from core.surface.double.spanning import spanned, spanning_vertices
+from core.field.local_surface import fit_local_surface
+from core.points import local_spacing
+from core.surface.double.spanning import spanned, spanning_vertices, stretched_vertices
 from tests import shapes
 
 SIDE = 21
@@ -48,3 +50,19 @@ def test_vertices_closer_to_openings_than_to_the_surface_span_them_and_rims_besi
     found = spanning_vertices(x, step, past_rim, places, level)
     np.testing.assert_array_equal(found, (away < radius[turned]) | (past_rim & (away < 0.3)))
     assert not spanning_vertices(x, step, past_rim, np.empty((0, 3)), level).any()
+
+
+def test_vertices_drawn_out_to_another_sheet_are_found_and_long_faces_on_a_sheet_are_not():
+    """Two sheets five cells apart, covered alone the lower one; one of its vertices is on the upper one, and one four
+    cells along its own."""
+    sheet = np.column_stack([AT, np.zeros(len(AT))])
+    points = np.concatenate([sheet, sheet + np.array([0, 0, 0.5])])
+    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    surface = fit_local_surface(points, up, np.ones(len(points)), local_spacing(points), 3.0)
+    middle, aside = 10 * SIDE + 10, 5 * SIDE + 5
+    vertices = sheet.copy()
+    vertices[middle] += [0, 0, 0.5]
+    vertices[aside] += [0, -0.4, 0]
+    around = middle + np.array([-SIDE, -1, 0, 1, SIDE])
+    np.testing.assert_array_equal(np.flatnonzero(stretched_vertices(vertices, QUADS, surface, 0.1)), around)
+    assert not stretched_vertices(sheet, QUADS, surface, 0.1).any()

@@ -59,10 +59,15 @@ def test_its_rim_is_where_the_samples_end():
 
 def test_a_creased_scan_is_wound_alike():
     """A bust, open below: of its dual contour 246 edges have three faces or more, and 293 cannot be wound alike. What
-    lies between its sides was in ten pieces, and went to and fro between the two walls of its foot."""
+    lies between its sides was in ten pieces, and went to and fro between the two walls of its foot. Of its points with
+    one in fourteen left out, the side of the double cover has one to three borders: slits may show neither wall."""
     run = single(read_points("tests/data/bust.ply"), resolution=128, denoise="auto")
     assert run.sheet.edge_counts()[1].max() == 2
-    assert len(shapes.components(run.sheet)) == run.sheet.border_loops() == 1
+    assert len(shapes.components(run.sheet)) == 1
+    assert run.sheet.border_loops() <= 2
+    edges, count = run.sheet.edge_counts()
+    ends = run.sheet.vertices[edges[count == 1]].mean(axis=1)
+    assert (ends[:, 2] > -4.5).sum() < 0.1 * len(ends)  # the foot is at -4.65
     (warning,) = run.report["warnings"]
     assert "4% of the points lie more than 0.5 cells off the single layer" in warning
     away = KDTree(run.sheet.vertices).query(run.points)[0] / run.field.spacing

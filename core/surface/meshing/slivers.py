@@ -1,0 +1,171 @@
+"""Slivers: triangles of hardly any height, as there are where a mesh is flattened against the rim of a sheet."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...linalg import cross, dots, lengths, symmetric
+from ..mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, in_use, looked_up
+
+_SHORT = 0.3  # cells, edges whose ends become one
+_FLAT = 0.15  # height of triangles over their longest side, below which this is turned
+_LOW = 0.1  # cells, their height, at most: as much the surface moves there
+_ALIKE = 0.8  # least cosine between normals of faces before and after
+_NO_NORMAL = 0.1  # of the square of short edges, area below which a face has none
+_EVEN = 0.01  # weight of either end beside how far it is from flat, in telling where they become one
+_ROUNDS = 16
+
+
+def without_slivers(mesh: Mesh, cell: float) -> Mesh:
+    """A closed manifold mesh without its short edges, whose ends become one vertex (H. Hoppe et al., Mesh optimization,
+    SIGGRAPH 1993), and without its flat triangles, whose longest side is turned to the other diagonal; wherever it
+    stays a manifold of the same topology, and no other face turns over.
+
+    cell : length of one, in the units of the mesh
+
+    Shorter edges go first, and their ends become one close to that where the mesh bends more: so what lies on a rim is
+    one there, and rims and creases stay. A quad is a triangle after one of its sides is gone, and two after one is
+    turned.
+    """
+    near = _around_slivers(mesh, cell)
+    if not near.any():
+        return mesh
+    inside, outside = mesh.of_faces(near), mesh.of_faces(~near)
+    chance, free = np.random.default_rng(0), np.ones(len(mesh.vertices), bool)
+    free[outside.faces] = False
+    for shortest in np.linspace(0, _SHORT * cell, _ROUNDS + 1)[1:]:
+        inside = _with_sides_turned(_with_ends_joined(inside, free, shortest, cell, chance), free, cell)
+    parts = (np.split(part.faces, [part.pairs, 2 * part.pairs]) for part in (outside, inside))
+    faces = np.concatenate([part for both in zip(*parts, strict=True) for part in both])
+    vertices, faces = in_use(inside.vertices, faces)
+    return Mesh(vertices, faces.astype(np.int32), outside.pairs + inside.pairs)
+
+
+def _around_slivers(mesh, cell):
+    """The faces lower than short edges, two rings of faces around them, and the other halves of their quads, (f,)."""
+    flatness, longest = _shape(*at_corners(mesh.vertices, mesh.faces))
+    near = flatness * longest < _SHORT * cell
+    for _ in range(2):
+        vertices = np.zeros(len(mesh.vertices), bool)
+        vertices[mesh.faces[near]] = True
+        near = vertices[mesh.faces].any(axis=1)
+        near[: 2 * mesh.pairs] = np.tile(near[: 2 * mesh.pairs].reshape(2, -1).any(axis=0), 2)
+    return near
+
+
+def _shape(a, b, c):
+    """Height of triangles over their longest side, by their corners (3,f) each, and that side, (f,)."""
+    square = np.max([dots(p - q, p - q) for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    square = np.maximum(square, np.finfo(float).tiny)
+    return lengths(cross(b - a, c - a)) / square, np.sqrt(square)
+
+
+def _with_ends_joined(mesh, free, shortest, cell, chance):
+    """The mesh with the ends of edges less than `shortest` made one vertex, of as many at once as are no neighbours, in
+    an order left to `chance`, a generator; between vertices that are `free`, (v,) bool: all faces of these are there.
+
+    It stays a manifold of its topology where the ends have two neighbours in common, those across the edge, which have
+    a neighbour more than these three faces (T. Dey et al., Topology preserving edge contraction, 1999).
+    """
+    n, x = len(mesh.vertices), mesh.vertices
+    (low, high), _ = edges_of(mesh.faces, n)
+    length = ((x[low] - x[high]) ** 2).sum(axis=1)
+    short = np.flatnonzero((length < shortest**2) & free[low] & free[high])
+    short = chance.permutation(short)
+    links = symmetric(np.ones(len(low), np.int32), low, high, n)
+    shared = np.asarray(links[low[short]].multiply(links[high[short]]).sum(axis=1)).reshape(-1)
+    ends = np.stack([low, high])[:, short[shared == 2]]
+    ends = ends[:, _no_neighbours(ends, low, high, n)]
+    if not ends.size:
+        return mesh
+    weight = _EVEN + 1 - _straightness(mesh)[ends][..., None]
+    joined = x.copy()
+    joined[ends] = (weight * x[ends]).sum(axis=0) / weight.sum(axis=0)
+    number = np.full(n, -1)
+    number[ends] = np.arange(ends.shape[1])
+    at = number[mesh.faces]
+    edge, gone = at.max(axis=1), (at >= 0).sum(axis=1) == 2
+    beside = np.flatnonzero((edge >= 0) & ~gone)
+    alike = _alike(*(_normals(*at_corners(places, mesh.faces[beside])) for places in (x, joined)), cell)
+    stays = np.zeros(ends.shape[1], bool)
+    stays[edge[beside[~alike]]] = True
+    across = mesh.faces[gone][at[gone] < 0]
+    stays[edge[gone][np.diff(links.indptr)[across] == 3]] = True
+    one, other = ends[:, ~stays]
+    if not len(one):
+        return mesh
+    vertices, into = x.copy(), np.arange(n, dtype=mesh.faces.dtype)
+    vertices[one], into[other] = joined[one], one
+    return replace(mesh, vertices=vertices, faces=into[mesh.faces]).of_faces(~gone | stays[edge])
+
+
+def _no_neighbours(ends, low, high, n):
+    """Which edges with `ends` (2,e) come before all those that they share an end with, or an edge from `low` to `high`
+    leads to, (e,) bool."""
+    rank = np.arange(ends.shape[1])
+    first = np.full(n, len(rank))
+    for end in ends:
+        np.minimum.at(first, end, rank)
+    near = first.copy()
+    np.minimum.at(near, low, first[high])
+    np.minimum.at(near, high, first[low])
+    return (near[ends] == rank).all(axis=0)
+
+
+def _straightness(mesh):
+    """1 for vertices whose faces are in a plane, 0 where these lie on each other as at a rim, (v,) float64."""
+    n, corner = len(mesh.vertices), mesh.faces.reshape(-1)
+    normal = _normals(*at_corners(mesh.vertices, mesh.faces))
+    total = np.stack([np.bincount(corner, np.repeat(x, 3), n) for x in normal])
+    area = np.bincount(corner, np.repeat(lengths(normal), 3), n)
+    return lengths(total) / np.maximum(area, np.finfo(float).tiny)
+
+
+def _with_sides_turned(mesh, free, cell):
+    """The mesh with the longest sides of flat triangles turned whose apex is `free`, (v,) bool; of as many at once as
+    have no face in common."""
+    faces, n = mesh.faces, len(mesh.vertices)
+    corners = at_corners(mesh.vertices, faces)
+    flatness, longest = _shape(*corners)
+    row = np.flatnonzero((flatness < _FLAT) & (flatness * longest < _LOW * cell))
+    row = row[np.argsort(flatness[row], kind="stable")]
+    top = np.argmax([lengths(corners[k - 2][:, row] - corners[k - 1][:, row]) for k in range(3)], axis=0)
+    edge, count = edge_numbers(faces, n)
+    side = edge[row, (top + 1) % 3]
+    inner = free[faces[row, top]] & (count[side] == 2)
+    row, top, side = row[inner], top[inner], side[inner]
+    other = np.bincount(edge.reshape(-1), np.repeat(np.arange(len(faces)), 3))[side].astype(np.int64) - row
+    c, a, b = (faces[row, (top + k) % 3] for k in range(3))
+    d = faces[other].sum(axis=1, dtype=faces.dtype) - a - b
+    turned = [np.stack([c, a, d], axis=1), np.stack([c, d, b], axis=1)]
+    places = [at_corners(mesh.vertices, each) for each in turned]
+    better = np.minimum(*(_shape(*each)[0] for each in places)) > np.minimum(flatness[row], flatness[other])
+    normal = _normals(*(corner[:, other] for corner in corners))
+    for each in places:
+        better &= _alike(normal, _normals(*each), cell)
+    better &= (c != d) & (looked_up(edge_table(faces, n), c, d) == 0)
+    can = np.flatnonzero(better)
+    first = np.full(len(faces), len(row))
+    for face in (row, other):
+        np.minimum.at(first, face[can], can)
+    can = can[(first[row[can]] == can) & (first[other[can]] == can)]
+    can = can[np.unique(np.sort([c[can], d[can]], axis=0), axis=1, return_index=True)[1]]
+    if not len(can):
+        return mesh
+    faces, whole = faces.copy(), np.ones(len(faces), bool)
+    for face, each in zip((row, other), turned, strict=True):
+        faces[face[can]], whole[face[can]] = each[can], False
+    paired = whole[: 2 * mesh.pairs].reshape(2, -1).all(axis=0)
+    return replace(mesh, faces=faces).of_faces(np.ones(len(faces), bool), paired)
+
+
+def _normals(a, b, c):
+    """(3,f), twice as long as the area of triangles with corners (3,f) each."""
+    return cross(b - a, c - a)
+
+
+def _alike(before, after, cell):
+    """Whether faces have like normals (3,f) `before` and `after`, or had none, (f,) bool."""
+    size = lengths(before)
+    none = size < _NO_NORMAL * (_SHORT * cell) ** 2
+    return none | (dots(before, after) > _ALIKE * size * lengths(after))
