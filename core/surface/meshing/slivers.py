@@ -13,7 +13,7 @@ _LOW = 0.1  # cells, their height, at most: as much the surface moves there
 _ALIKE = 0.8  # least cosine between normals of faces before and after
 _NO_NORMAL = 0.1  # of the square of short edges, area below which a face has none
 _EVEN = 0.01  # weight of either end beside how far it is from flat, in telling where they become one
-_ROUNDS = 16
+_ROUNDS, _TIMES = 5, 3  # with longer edges each time; that ends are joined before sides are turned
 
 
 def without_slivers(mesh: Mesh, cell: float) -> Mesh:
@@ -34,7 +34,9 @@ def without_slivers(mesh: Mesh, cell: float) -> Mesh:
     chance, free = np.random.default_rng(0), np.ones(len(mesh.vertices), bool)
     free[outside.faces] = False
     for shortest in np.linspace(0, _SHORT * cell, _ROUNDS + 1)[1:]:
-        inside = _with_sides_turned(_with_ends_joined(inside, free, shortest, cell, chance), free, cell)
+        for _ in range(_TIMES):
+            inside = _with_ends_joined(inside, free, shortest, cell, chance)
+        inside = _with_sides_turned(inside, free, cell)
     parts = (np.split(part.faces, [part.pairs, 2 * part.pairs]) for part in (outside, inside))
     faces = np.concatenate([part for both in zip(*parts, strict=True) for part in both])
     vertices, faces = in_use(inside.vertices, faces)
