@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...field.grid import node_strides
 from ...linalg import cross, dots, lengths
 from ...parallel import work_through
 from ...progress import Progress
@@ -18,7 +17,6 @@ from ..meshing.centring import Bend, bend_of
 HAIR = 3e-4  # cells, between the layers
 _SHIFT = 0.5  # cells, by which layers are held apart in looking for faces of the other
 _NEAREST = 8  # faces that are tried
-_AROUND = 2.0  # cells, of a place, within which faces are looked at
 _REACH = 0.75  # cells, farther sheets are others
 _OPPOSITE = -0.5  # largest cosine between the normals of either layer
 _SLIVER = 1e-6  # squared cells, twice the area of faces that have no direction
@@ -30,8 +28,9 @@ def laid_apart(mesh: Mesh, cell: float, progress=None) -> Mesh:
 
     Vertices move outwards along their normals, by as much as the faces around them dip below the surface: so each layer
     stays on its own side of the surface, however the triangles of the other lie. Where the mesh bends within a face or
-    two, at creases, rims and thin parts, that cannot be told from the normals, and most of it would be for nothing;
-    there both layers move by half of what vertices and middles of edges lack to clear the other one.
+    two, at creases, rims and thin parts, that cannot be told from the normals, and most of it would be for nothing; nor
+    where samples are too few for both sides to have the same foot points. So both layers move by half of what vertices,
+    and where the mesh bends the middles of edges, lack to clear the other one.
 
     cell : length of one, in the units of the mesh
     """
@@ -44,7 +43,7 @@ def laid_apart(mesh: Mesh, cell: float, progress=None) -> Mesh:
 def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
     beside = np.zeros(len(mesh.vertices), bool)
     beside[mesh.faces[bend.sharp[mesh.faces].any(axis=1)]] = True
-    ends = np.concatenate([np.tile(np.flatnonzero(beside)[:, None], 2), bend.edges[beside[bend.edges].all(axis=1)]]).T
+    ends = np.concatenate([np.tile(np.arange(len(beside))[:, None], 2), bend.edges[beside[bend.edges].all(axis=1)]]).T
     place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
     behind, face = _other_layer(mesh, place, outward, cell, progress)
@@ -61,8 +60,7 @@ def _other_layer(mesh, place, outward, cell, progress):
     behind, which = np.full(len(place), np.inf), np.zeros(len(place), np.intp)
     if not len(place):
         return behind, which
-    near = np.flatnonzero(_beside(mesh.vertices, place, _AROUND * cell)[mesh.faces].any(axis=1))
-    corners = at_corners(mesh.vertices, mesh.faces[near])
+    corners = at_corners(mesh.vertices, mesh.faces)
     normal = cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.maximum(lengths(normal), _SLIVER * cell**2)
     held = sum(corners) / 3 - _SHIFT * cell * normal
@@ -79,17 +77,8 @@ def _other_layer(mesh, place, outward, cell, progress):
         depth = -dots(a, other) / np.minimum(along, _OPPOSITE)  # of others, it does not count
         hit = (np.max(turns, axis=0) <= 0) & (along < _OPPOSITE) & (np.abs(depth) < _REACH * cell)
         nearest = np.where(hit, np.abs(depth), np.inf).argmin(axis=0), np.arange(face.shape[1])
-        which[part] = near[face[nearest]]
+        which[part] = face[nearest]
         behind[part] = np.where(hit[nearest], depth[nearest], np.inf)
 
     work_through(look, progress.chunks(len(place), _CHUNK))
     return behind, which
-
-
-def _beside(x, places, side):
-    """Which of x (m,3) are in the same box of a lattice as one of places (p,3), or in one next to it, (m,) bool."""
-    lowest, highest = x.min(axis=0), x.max(axis=0)
-    strides = node_strides(((highest - lowest) // side).astype(np.int64) + 3)
-    box, home = (((each - lowest) / side).astype(np.int64) @ strides for each in (x, places))
-    around = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ strides
-    return np.isin(box, np.unique(home)[:, None] + around)

@@ -30,17 +30,20 @@ def without_slivers(mesh: Mesh, cell: float) -> Mesh:
     near = _around_slivers(mesh, cell)
     if not near.any():
         return mesh
-    inside, outside = mesh.of_faces(near), mesh.of_faces(~near)
-    chance, free = np.random.default_rng(0), np.ones(len(mesh.vertices), bool)
-    free[outside.faces] = False
+    row, outside = np.unique(mesh.faces[near]), mesh.of_faces(~near)
+    free, chance = ~np.isin(row, outside.faces), np.random.default_rng(0)
+    part = mesh.part(near)
     for shortest in np.linspace(0, _SHORT * cell, _ROUNDS + 1)[1:]:
         for _ in range(_TIMES):
-            inside = _with_ends_joined(inside, free, shortest, cell, chance)
-        inside = _with_sides_turned(inside, free, cell)
-    parts = (np.split(part.faces, [part.pairs, 2 * part.pairs]) for part in (outside, inside))
-    faces = np.concatenate([part for both in zip(*parts, strict=True) for part in both])
-    vertices, faces = in_use(inside.vertices, faces)
-    return Mesh(vertices, faces.astype(np.int32), outside.pairs + inside.pairs)
+            part = _with_ends_joined(part, free, shortest, cell, chance)
+        part = _with_sides_turned(part, free, cell)
+    vertices = mesh.vertices.copy()
+    vertices[row] = part.vertices
+    part = replace(part, faces=row[part.faces])
+    kinds = (np.split(each.faces, [each.pairs, 2 * each.pairs]) for each in (outside, part))
+    faces = np.concatenate([faces for both in zip(*kinds, strict=True) for faces in both])
+    vertices, faces = in_use(vertices, faces)
+    return Mesh(vertices, faces.astype(np.int32), outside.pairs + part.pairs)
 
 
 def _around_slivers(mesh, cell):

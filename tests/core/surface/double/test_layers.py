@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import LinearNDInterpolator
 
 from core import Cancelled, Mesh, Settings, reconstruct
 from core.progress import Progress
@@ -55,6 +56,25 @@ def test_a_fold_that_pokes_through_the_other_layer_is_taken_back():
     above, below = up[: len(ridge)][ridge], up[len(ridge) :][ridge]
     assert (above - below).min() > -0.05
     np.testing.assert_allclose(0.5 * (above + below), 0.1, atol=0.02)
+
+
+def test_flat_layers_with_other_foot_points_are_taken_back_to_their_sides():
+    """The outer one is lower than the inner one in the middle, by a tenth of a cell at most, and bends nowhere."""
+
+    def lower(x, y):
+        return -0.1 * np.exp(-((x - SIDE / 2) ** 2 + (y - SIDE / 2) ** 2) / 4)
+
+    (inner, quads), (outer, _) = uneven(lambda x, y: 0 * x), uneven(lower, seed=1)
+    apart = both(mesh_of(outer, quads), mesh_of(inner, quads))
+    before, after = (at.reshape(2, -1, 3) for at in (apart.vertices, laid_apart(apart, 1.0).vertices))
+    within = np.linalg.norm(outer[:, :2] - SIDE / 2, axis=1) < 4
+
+    def lowest(layers):
+        under = LinearNDInterpolator(layers[1][:, :2], layers[1][:, 2])
+        return (layers[0][within, 2] - under(layers[0][within, :2])).min()
+
+    assert lowest(before) < -0.08
+    assert lowest(after) > -0.01
 
 
 def test_the_other_layer_is_found_as_by_trying_every_face():
