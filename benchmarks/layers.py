@@ -35,9 +35,9 @@ Made by `python -m benchmarks.layers FOLDER`, which writes this page and the num
 The layers are mostly both sides of the single layer, a hair apart: 3e-4 cells. Elsewhere (sheets cross and points do
 not show where, others run side by side, points are sparse or dense) they are extracted at an offset and pulled onto
 the surface, and where it bends their triangles are other chords of it. So each is taken to its own side of the
-surface, by as much as its faces dip through it, and where the mesh bends sharply by what either lacks to clear the
-other. A viewer that colours back faces shows layers that cross as speckles, and programs that ask for meshes that do
-not cross themselves refuse them.
+surface, by as much as its faces dip through it, and by what either lacks to clear the other: at vertices, and where the
+mesh bends sharply at the middles of edges. A viewer that colours back faces shows layers that cross as speckles, and
+programs that ask for meshes that do not cross themselves refuse them.
 
 *Gap*: how far the layer behind lies from points of the other, percentiles in cells; negative where it lies in front.
 *Crossed*: share of the points where it does: along lines where the surface itself crosses, and where points are too few
