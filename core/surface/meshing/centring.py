@@ -12,16 +12,16 @@ from ...parallel import in_order, over_rows
 from ..mesh import AT_ONCE, Mesh, at_corners
 from .evening import FLAT, vertex_normals
 
-_SHARE = 2 / 3
+_SHARE = 2 / 3  # of what faces are off at their centroids
 
 
 def centred(mesh: Mesh) -> Mesh:
     """The mesh, whose vertices lie on the surface, with each moved along its normal by two thirds of what the faces
     around it are off at their centroids.
 
-    Squared distances at vertices and at centroids together, which DCUDF descends to (Hou et al., ACM TOG 42(6), 2023),
-    are least at half of that, those all over a face that is a chord of a quadratic surface at three quarters, and mean
-    distances, as measured, in between.
+    By one half, squared distances at vertices and at centroids together are least, which DCUDF descends to (Hou et al.,
+    ACM TOG 42(6), 2023); by three quarters, those all over the faces of a quadratic surface. Measured, mean distances
+    are about even from one half to three quarters, but on dense samples less in between.
 
     Vertices at borders stay, and so do those at edges of more than two faces or of two that are wound unlike, and where
     the mesh bends within a face or two, at creases for instance; faces there count as flat.

@@ -75,8 +75,7 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     n, x = len(mesh.vertices), mesh.vertices
     (low, high), _ = edges_of(mesh.faces, n)
     length = ((x[low] - x[high]) ** 2).sum(axis=1)
-    short = np.flatnonzero((length < shortest**2) & free[low] & free[high])
-    short = chance.permutation(short)
+    short = chance.permutation(np.flatnonzero((length < shortest**2) & free[low] & free[high]))
     links = symmetric(np.ones(len(low), np.int32), low, high, n)
     shared = np.asarray(links[low[short]].multiply(links[high[short]]).sum(axis=1)).reshape(-1)
     ends = np.stack([low, high])[:, short[shared == 2]]
