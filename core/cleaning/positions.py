@@ -16,8 +16,8 @@ from .quadrics import fit_quadrics
 
 LONGEST_MOVE = 4.0  # standard deviations of the noise
 
-_PASSES = 2
-_SHARE = 0.7  # of the best single neighbourhood: several passes average over more than one
+_SHARES = 0.7, 0.6, 0.25  # of the best single neighbourhood, pass by pass, which together average over more than one;
+# the last takes out what is left between samples side by side
 _STEPS_PER_OCTAVE = 2  # of the neighbourhood sizes used
 
 
@@ -43,17 +43,17 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     if not noisy.any():
         return given, {}
     noise = estimate_noise(points, seed, progress.part(0.1, 0.4), noisy)
-    neighbours = _rounded(_SHARE * noise.neighbours, len(points))
+    sizes = [_rounded(share * noise.neighbours, len(points)) for share in _SHARES]
     moved = points
-    for turn in range(_PASSES):
-        moved = _onto_quadrics(moved, noisy, neighbours, progress.part(0.4 + 0.15 * turn, 0.55 + 0.15 * turn))
+    for turn, neighbours in enumerate(sizes):
+        moved = _onto_quadrics(moved, noisy, neighbours, progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
     step = strength * (moved - points)
     length = np.linalg.norm(step, axis=1)
     step *= np.minimum(1.0, LONGEST_MOVE * noise.level / np.maximum(length, np.finfo(float).tiny))[:, None]
     counts = {
         "noisy": int(noisy.sum()),
         "noise": float(np.median(noise.level[noisy])),
-        "neighbours": [int(k) for k in np.percentile(neighbours[noisy], (5, 50, 95), method="nearest")],
+        "neighbours": [int(k) for k in np.percentile(sizes[0][noisy], (5, 50, 95), method="nearest")],
         "mean_move": float(np.linalg.norm(step[noisy], axis=1).mean()),
     }
     return points + step, counts

@@ -4,6 +4,7 @@ import pytest
 from core import Cancelled
 from core.cleaning.noise_level import estimate_noise
 from core.cleaning.positions import LONGEST_MOVE, denoise
+from core.cleaning.quadrics import fit_quadrics
 from core.points import local_spacing
 from tests import shapes
 
@@ -67,6 +68,14 @@ def test_a_plane_with_noise_becomes_flat_and_keeps_its_rim():
     moved, _ = denoise(points + np.random.default_rng(7).normal(size=points.shape) * 0.02, local_spacing(points))
     assert np.abs(moved[:, 2]).mean() < 0.005
     assert np.abs(moved[:, :2]).max() > 0.97
+
+
+@pytest.mark.parametrize(("deviation", "rough"), [(0.1, 0.01), (0.15, 0.03)])
+def test_samples_side_by_side_agree_after_heavy_noise(deviation, rough):
+    points = noisy_sphere(deviation, 3000)
+    moved, _ = denoise(points, local_spacing(points))
+    height = fit_quadrics(moved, np.arange(len(moved)), 20).height
+    assert np.percentile(height / local_spacing(moved), 95) < rough
 
 
 def test_too_few_samples_for_a_quadric_stay():
