@@ -1,4 +1,7 @@
-"""Points as scanners take them: depth images with flying points at silhouettes, and a scene seen from one spot."""
+"""Points as scanners take them: depth images with flying points at silhouettes, a scene seen from one spot, and a frame
+of a depth camera."""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +17,7 @@ _AWAY, _WIDER = 3.0, 1.05  # distance of a camera and half the width that it see
 _UP = np.array([0.3, 0.2, 0.93])  # along no camera's axis
 _LOWEST, _HIGHEST = -np.pi / 3, np.pi / 2  # elevations that the scanner in a room sees
 _FIRST_WIDTH, _FIRST_AROUND = 64, 200  # pixels, steps of a turn
+_VIEW, _AHEAD = np.pi / 3, np.array([0.8, 0.55, -0.25])  # across a frame of a depth camera; where it looks
 _ROUNDS = 5  # from those towards as many points as asked
 
 
@@ -69,3 +73,37 @@ def seen_from_one_spot(mesh: Mesh, count: int, percent: float, rng: np.random.Ge
         around = round(around * np.sqrt(count / len(rays)))
     deviation = 0.01 * percent * np.ptp(mesh.vertices, axis=0).max()
     return EYE + (depth + deviation * rng.normal(size=depth.shape)) * rays, EYE + depth * rays
+
+
+def before_camera(mesh: Mesh) -> Mesh:
+    """The mesh as a depth camera at `EYE` has it: itself at the origin, what it looks at along the third axis."""
+    return replace(mesh, vertices=(mesh.vertices - EYE) @ _camera().T)
+
+
+def in_room(points: np.ndarray) -> np.ndarray:
+    """Points (n,3) of a frame of that camera in the mesh's own place."""
+    return points @ _camera() + EYE
+
+
+def _camera():
+    """Unit vectors to the right of the camera, down and ahead, (3,3)."""
+    ahead = _AHEAD / np.linalg.norm(_AHEAD)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(ahead, right), ahead])
+
+
+def depth_frame(mesh: Mesh, width: int, step: float, noise: float, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """Points (n,3) of a frame, `width` pixels wide, that a depth camera at the origin takes along the third axis, and
+    the same points without what it adds to disparity: Gaussian `noise`, in steps, and rounding to whole steps. At the
+    middle depth a step is `step` times as far as a pixel is wide."""
+    pixel = 2 * np.tan(_VIEW / 2) / width
+    x, y = (pixel * (np.arange(count) - (count - 1) / 2) for count in (width, 3 * width // 4))
+    x, y = (grid.reshape(-1) for grid in np.meshgrid(x, y))
+    rays = np.stack([x, y, np.ones(len(x))], axis=1)
+    length = np.linalg.norm(rays, axis=1)
+    depth = first_hits(np.zeros(3), rays / length[:, None], mesh) / length
+    rays, depth = rays[np.isfinite(depth)], depth[np.isfinite(depth)]
+    unit = step * pixel / np.median(depth)
+    steps = np.rint(1 / (unit * depth) + noise * rng.normal(size=len(depth)))
+    return rays / (unit * steps[:, None]), rays * depth[:, None]

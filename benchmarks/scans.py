@@ -3,6 +3,7 @@
 import argparse
 import platform
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from .noise_measure import by_peer, cd_and_hd, kept_points
 from .noise_tables import cells, markdown
 from .peers import check_open3d, poisson
 from .pictures import View, caption, draw_points, draw_surface, save, sheet
-from .scanners import IMAGES, JUMP, SHARE, depth_images, seen_from_one_spot
+from .scanners import IMAGES, JUMP, SHARE, before_camera, depth_frame, depth_images, in_room, seen_from_one_spot
 from .shapes import rooms
 from .status import DONE, exit_status, said
 
@@ -28,6 +29,9 @@ POINTS = 20_000
 FAR = 0.008  # distance from the surface from which on a flying point is far from it, a hundredth of the longest side
 ROOM_POINTS = 30_000, 120_000
 ROOM_NOISE = 0.0, 0.1, 0.3  # per cent of the longest side
+FRAME_WIDTH = 320  # pixels
+FRAMES = (1.5, 0.0), (1.5, 0.3), (4.0, 0.0), (4.0, 0.3), (8.0, 0.5)  # pixels to a step of depth; noise, steps
+FRAME_SHOWN = FRAMES[3]
 FILTER = 20, 2.0  # neighbours and standard deviations of Open3D's statistical filter
 
 _FEET = 100_000
@@ -64,6 +68,15 @@ points taken for strays; there are none. *to the surface*: from what was seen, w
 the surface. Means (largest).
 
 {rooms}
+
+## A frame of a depth camera
+
+A camera in that room takes a frame, {width} pixels wide, whose disparity (one over depth) has Gaussian noise, and is
+rounded to whole steps. *step*: how far one is at the middle depth, in pixels there. *points*: from the points to the
+truth, as they come and as they are moved. *to the truth*, *seen*: from the single layer to the truth, and to it from
+what was seen. Means. *borders*, *pieces*: of the single layer. With `denoise=0` points stay where they are.
+
+{frames}
 """
 
 
@@ -91,6 +104,7 @@ def measure() -> dict:
         "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
         "images": [said(name, measure_images(name)) for name in SHAPES],
         "rooms": [said(f"room, {count:,} points, {noise:g} %", measure_room(count, noise)) for count, noise in scans],
+        "frames": [said(f"frame, steps of {step:g}, {noise:g}", measure_frame(step, noise)) for step, noise in FRAMES],
     }
 
 
@@ -140,6 +154,23 @@ def measure_room(count: int, percent: float) -> dict:
     }
 
 
+def measure_frame(step: float, noise: float, width: int = FRAME_WIDTH) -> dict:
+    """What becomes of a frame of a depth camera, as it is and as its points come, see `docs/scans.md`."""
+    truth = before_camera(rooms.room().mesh)
+    points, seen = depth_frame(truth, width, step, noise, np.random.default_rng(0))
+
+    def found(settings):
+        result = reconstruct(points, settings)
+        mesh, facts = result.sheet, result.report["meshes"]["single"]
+        feet = surface_points(mesh, _FEET, np.random.default_rng(0))
+        ways = {"points": (result.points, truth), "to_truth": (feet, truth), "seen": (seen, mesh)}
+        off = {name: 1e3 * closest_points(*way)[0].mean() for name, way in ways.items()}
+        return {**off, "borders": facts["borders"], "pieces": facts["pieces"]}
+
+    here, as_they_come = found(Settings(surface="single")), found(Settings(surface="single", denoise=0))
+    return {"points": len(points), "step": step, "noise": noise, "ours": here, "as_they_come": as_they_come}
+
+
 def write_page(measured: dict, docs: Path) -> Path:
     """Write scans.md and the numbers into the folder `docs`. Returns the page."""
     write_report(writable_folder(docs / "scans") / "numbers.json", measured)
@@ -155,6 +186,8 @@ def write_page(measured: dict, docs: Path) -> Path:
         deviations=FILTER[1],
         shapes=markdown(_shapes(measured["images"])),
         rooms=markdown(_rooms(measured["rooms"])),
+        width=FRAME_WIDTH,
+        frames=markdown(_frames(measured["frames"])),
     )
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -176,20 +209,36 @@ def _rooms(rows):
         yield f"{row['points']:,}", f"{row['percent']:g}", f"{row['dropped']:,}", *off
 
 
+def _frames(rows):
+    yield "points", "step", "noise", "", "points", "to the truth", "seen", "borders", "pieces"
+    for row in rows:
+        for name, way in (("here", "ours"), ("`denoise=0`", "as_they_come")):
+            off = (f"{row[way][of]:.2f}" for of in ("points", "to_truth", "seen"))
+            counts = (str(row[way][of]) for of in ("borders", "pieces"))
+            yield f"{row['points']:,}", f"{row['step']:g}", f"{row['noise']:g}", name, *off, *counts
+
+
 def picture(path: Path) -> Path:
-    """Points and surfaces of the tangle's depth images and of the noisiest scan of the room."""
-    figure, panels = sheet(1, 4)
+    """Points and surfaces of the tangle's depth images, of the noisiest scan of the room and of a frame of it."""
+    figure, panels = sheet(2, 4)
     tangle = depth_images(CASES["tangle_10k"].surface().mesh, POINTS, np.random.default_rng(0))[0]
     room = seen_from_one_spot(rooms.room().mesh, ROOM_POINTS[-1], ROOM_NOISE[-1], np.random.default_rng(0))[0]
+    frame = depth_frame(before_camera(rooms.room().mesh), FRAME_WIDTH, *FRAME_SHOWN, np.random.default_rng(0))[0]
     given = (
-        ("depth images of a tangle", tangle, View()),
-        ("a room from one spot", room, View((0.5, -1.0, 0.9))),
+        ("depth images of a tangle", tangle, View(), panels[0, :2]),
+        ("a room from one spot", room, View((0.5, -1.0, 0.9)), panels[0, 2:]),
+        ("a frame of a depth camera", frame, View((-1.0, -0.3, 0.6)), panels[1, :2]),
     )
-    for (left, right), (name, points, view) in zip(panels.reshape(2, 2), given, strict=True):
-        camera = view.camera(points, _PIXELS)
-        draw_points(left, points, camera)
+    for name, points, view, (left, right) in given:
+        place = in_room if points is frame else np.asarray
+        camera = view.camera(place(points), _PIXELS)
+        draw_points(left, place(points), camera)
         caption(left, name, f"{len(points):,} points")
-        draw_surface(right, reconstruct(points).surface, camera, view)
+        cover = reconstruct(points).surface
+        draw_surface(right, replace(cover, vertices=place(cover.vertices)), camera, view)
+    stepped = reconstruct(frame, Settings(denoise=0)).surface
+    draw_surface(panels[1, 2], replace(stepped, vertices=in_room(stepped.vertices)), camera, view)
+    caption(panels[1, 2], "of its points as they come")
     return save(figure, path)
 
 

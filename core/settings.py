@@ -118,7 +118,8 @@ class Settings:
     denoise: float = _option(
         "auto",
         "How far points are moved onto the smooth surface through their neighbours: not at all (0) to all the way (1). "
-        "With auto all the way where the scan, or a good part of it, is found noisy, else not at all",
+        "With auto all the way where the scan, or a good part of it, is found noisy, or is a frame of a depth camera "
+        "whose depth comes in steps, else not at all",
         limits=(0.0, 1.0),
         word="auto",
     )

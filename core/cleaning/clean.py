@@ -1,23 +1,27 @@
 """Stray samples dropped, noisy ones moved: what the rest of the method then takes for the surface's own."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..points import Samples, local_spacing
 from ..progress import Progress
 from ..settings import Settings
+from .depth_steps import between_steps
 from .outliers import find_outliers
 from .positions import denoise
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
-    """Samples without strays and noise, and what was done about either, in input units, for the report.
+    """Samples without strays, noise and steps of depth, and what was done about them, in input units, for the report.
 
     Clean samples come back as they are, bit for bit.
     """
     progress = Progress.of(progress)
+    samples, stepped = _between_steps(samples, settings.denoise, progress.part(0.0, 0.1))
     dropped = np.zeros(len(samples.points), bool)
     if settings.outliers:
-        dropped = find_outliers(samples.points, progress.part(0.0, 0.3))
+        dropped = find_outliers(samples.points, progress.part(0.1, 0.3))
     if dropped.any():
         samples = samples.without(dropped, f"{dropped.sum()} of {len(dropped)} points dropped as outliers")
     spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
@@ -25,4 +29,21 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     if done:
         samples = samples.moved(moved)
         done |= {name: done[name] * samples.scale for name in ("noise", "mean_move")}
-    return samples, {"outliers": int(dropped.sum()), **done}
+    return samples, {"outliers": int(dropped.sum()), **stepped, **done}
+
+
+def _between_steps(samples, strength, progress):
+    """The samples moved off the steps of depth that they are in, where they are, and the largest of these."""
+    if strength == 0:
+        return samples, {}
+    moved, frame = between_steps(samples.given, progress)
+    if frame is None:
+        return samples, {}
+    largest = frame.step * np.abs(samples.given[:, frame.axis]).max() ** 2
+    step = (1.0 if strength == "auto" else strength) * (moved - samples.given)
+    samples = samples.moved(samples.points + step / samples.scale)
+    said = (
+        f"depth is in steps of up to {largest:.2g}, as a depth camera sees it: points were moved off them; with "
+        "denoise=0 they stay"
+    )
+    return replace(samples, warnings=(*samples.warnings, said)), {"depth_step": float(largest)}

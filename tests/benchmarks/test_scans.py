@@ -13,8 +13,17 @@ pytest.importorskip("igl")
 from benchmarks import noise_measure, scans
 from benchmarks.geometry import closest_points
 from benchmarks.metrics import surface_errors
-from benchmarks.scanners import EYE, IMAGES, depth_images, seen_from_one_spot
-from benchmarks.scans import ROOM_NOISE, ROOM_POINTS, SHAPES, measure_images, measure_room, write_page
+from benchmarks.scanners import EYE, IMAGES, before_camera, depth_frame, depth_images, in_room, seen_from_one_spot
+from benchmarks.scans import (
+    FRAMES,
+    ROOM_NOISE,
+    ROOM_POINTS,
+    SHAPES,
+    measure_frame,
+    measure_images,
+    measure_room,
+    write_page,
+)
 from benchmarks.shapes import closed, rooms
 from core import Mesh
 
@@ -82,6 +91,22 @@ def test_of_a_noisy_room_next_to_nothing_is_dropped_and_what_is_seen_is_near_the
     assert row["to_surface"]["mean"] < row["to_truth"]["mean"] < 3
 
 
+def test_a_frame_is_in_steps_of_disparity_and_its_pixels_see_the_mesh():
+    mesh = before_camera(rooms.room().mesh)
+    points, seen = depth_frame(mesh, 40, 2.0, 0.0, np.random.default_rng(0))
+    assert closest_points(seen, mesh)[0].max() < 1e-6
+    steps = np.median(seen[:, 2]) / (2.0 * 2 * np.tan(np.pi / 6) / 40) / points[:, 2]
+    assert np.abs(steps - np.rint(steps)).max() < 1e-6
+    np.testing.assert_allclose(points / points[:, 2:], seen / seen[:, 2:])
+    assert closest_points(in_room(seen), rooms.room().mesh)[0].max() < 1e-6
+
+
+def test_steps_of_a_frame_are_smoothed():
+    row = measure_frame(4.0, 0.3, width=120)
+    assert row["ours"]["points"] < 0.5 * row["as_they_come"]["points"]
+    assert row["ours"]["borders"] < 0.5 * row["as_they_come"]["borders"]
+
+
 def made_up():
     errors = {"cd": 0.5, "hd": 9.0}
     ways = {"ours": errors, "all": {"cd": 5.0, "hd": 90.0}, "none": errors, "poisson": {"cd": 2.5, "hd": 70.0}}
@@ -91,7 +116,11 @@ def made_up():
     del images[1]["poisson"]
     off = {"to_surface": {"mean": 0.25, "max": 4.0}, "to_truth": {"mean": 0.5, "max": 6.0}}
     rooms = [{"points": n, "percent": p, "dropped": 3, **off} for n in ROOM_POINTS for p in ROOM_NOISE]
-    return {"versions": {"Python": "3.11"}, "images": images, "rooms": rooms}
+    way = {"points": 0.125, "to_truth": 0.5, "seen": 0.25, "borders": 3, "pieces": 2}
+    frames = [
+        {"points": 900, "step": s, "noise": n, "ours": way, "as_they_come": {**way, "borders": 90}} for s, n in FRAMES
+    ]
+    return {"versions": {"Python": "3.11"}, "images": images, "rooms": rooms, "frames": frames}
 
 
 def test_page_holds_every_row(tmp_path):
@@ -100,5 +129,7 @@ def test_page_holds_every_row(tmp_path):
     assert f"| {SHAPES[0]} | 1.25% | 99.0% | 0.20% | 0.500 (9) | 5.000 (90) | 0.500 (9) | 2.500 (70) |" in page
     assert f"| {SHAPES[1]} | 1.25% | – | 0.20% | 0.500 (9) | 5.000 (90) | 0.500 (9) | – |" in page
     assert "| 30,000 | 0.1 | 3 | 0.25 (4) | 0.50 (6) |" in page
+    assert "| 900 | 4 | 0.3 | here | 0.12 | 0.50 | 0.25 | 3 | 2 |" in page
+    assert "| 900 | 4 | 0.3 | `denoise=0` | 0.12 | 0.50 | 0.25 | 90 | 2 |" in page
     assert f"{IMAGES} depth images" in page
     assert json.loads((tmp_path / "scans" / "numbers.json").read_text()) == measured
