@@ -21,7 +21,7 @@ _EVEN, _EVENER = 0.1, 0.5  # median deviation of gaps between disparities from t
 _PIXELS = 0.05  # deviation of the distance to the next pixel from its median, of four samples in five, at most
 _BESIDE, _AREAS = 3, 0.1  # of the four nearest pixels at a sample's own depth; share of samples with so many, at least
 _NEIGHBOURS = 100, 60, 25  # samples, pass by pass
-_LONGEST = 2.0  # steps, that a sample moves at most
+_LONGEST, _NO_FARTHER = 2.0, 2.0  # steps, that a sample moves at most; times its depth
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def find_frame(points: np.ndarray) -> Frame | None:
 
 def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame | None]:
     """Points (n,3), input units, moved off the steps of the frame that they are, and that frame; the very array given
-    and None where they are none. No point moves by more than two steps."""
+    and None where they are none. No point moves by more than two steps, nor to more than twice its depth."""
     frame = find_frame(points)
     if frame is None:
         return points, None
@@ -85,7 +85,10 @@ def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame 
         moved += fit_quadrics(moved, every, k, part, Clusters(moved)).step
     way = moved - steps
     length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
-    return frame.in_space(steps + way * np.minimum(1.0, _LONGEST / length)), frame
+    moved = steps + way * np.minimum(1.0, _LONGEST / length)
+    disparity = moved[:, frame.axis]
+    np.maximum(disparity, steps[:, frame.axis] / _NO_FARTHER, out=disparity)
+    return frame.in_space(moved), frame
 
 
 def _unevenness(gaps):

@@ -98,6 +98,16 @@ def test_points_come_closer_to_the_surface_and_none_goes_far(noise, share):
     assert np.linalg.norm(camera.seen(moved) - camera.seen(points), axis=1).max() < 2 + 1e-9
 
 
+def test_the_farthest_stay_before_the_camera():
+    rng = np.random.default_rng(0)
+    patches = rng.integers(1, 20, (8, 8)).repeat(10, axis=0).repeat(10, axis=1).ravel()
+    points = rays() / (0.01 * np.where(rng.random(len(patches)) < 0.05, 1, patches)[:, None])
+    moved, camera = between_steps(points)
+    assert camera is not None
+    assert (moved[:, 2] > 0).all()
+    assert (moved[:, 2] < 2.001 * points[:, 2]).all()
+
+
 def test_a_run_says_so_and_denoise_at_0_leaves_them():
     points = frame()[0]
     samples = prepare_samples(points)
