@@ -13,7 +13,6 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..progress import Progress
-from .clusters import Clusters
 from .quadrics import fit_quadrics
 
 _LEVELS, _ON_EACH = 16, 16  # distinct depths, and samples at each of them on average, at least
@@ -82,7 +81,7 @@ def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame 
     moved, every = steps.copy(), np.arange(len(points))
     for turn, k in enumerate(_NEIGHBOURS):
         part = progress.part(turn / len(_NEIGHBOURS), (turn + 1) / len(_NEIGHBOURS))
-        moved += fit_quadrics(moved, every, k, part, Clusters(moved)).step
+        moved += fit_quadrics(moved, every, k, part).step
     way = moved - steps
     length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
     moved = steps + way * np.minimum(1.0, _LONGEST / length)
