@@ -23,16 +23,11 @@ from .progress import Progress, watched
 from .reconstruction import Reconstruction
 from .settings import WHOLE_BOX, Settings
 from .surface.extract import Surfaces, band_for, extract_surfaces
+from .surface.mesh import curve_count
 from .surface.meshing.pieces import piece_count
 from .surface.meshing.quality import quad_quality, triangle_quality
 
 _COARSE = 0.1  # cells, median local spacing below which a warning says that the grid is too coarse for the points
-_FACTS = (
-    lambda mesh: {"borders": mesh.border_loops(), "nonmanifold_edges": int((mesh.edge_counts()[1] > 2).sum())},
-    lambda mesh: {"pieces": piece_count(mesh)},
-    triangle_quality,
-    quad_quality,
-)
 
 
 def reconstruct(
@@ -151,6 +146,19 @@ def _too_coarse(local, grid):
         f"points lie {cells:.2g} cells apart, and what they show within a cell is lost; raise the resolution, beyond "
         f"{WHOLE_BOX} with a band, or reconstruct parts that lie far from each other one by one",
     )
+
+
+def _edge_facts(mesh):
+    edges, count = mesh.edge_counts()
+    return {"borders": curve_count(edges[count == 1]), "nonmanifold_edges": int((count > 2).sum())}
+
+
+_FACTS = (  # what takes longest first, as they are found side by side
+    triangle_quality,
+    _edge_facts,
+    lambda mesh: {"pieces": piece_count(mesh)},
+    quad_quality,
+)
 
 
 def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:

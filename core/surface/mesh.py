@@ -60,10 +60,7 @@ class Mesh:
     def border_loops(self) -> int:
         """Number of connected curves that the border edges (those of one face) form."""
         edges, counts = self.edge_counts()
-        corners, ends = np.unique(edges[counts == 1], return_inverse=True)
-        ends = ends.reshape(-1, 2)
-        graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(corners),) * 2)
-        return connected_components(graph, directed=False)[0] if len(corners) else 0
+        return curve_count(edges[counts == 1])
 
     def face_areas(self) -> np.ndarray:
         """(f,) float64, square input units."""
@@ -75,6 +72,14 @@ class Mesh:
 
         over_rows(measure, len(self.faces), AT_ONCE)
         return found
+
+
+def curve_count(edges: np.ndarray) -> int:
+    """Number of connected curves that edges (e,2) form."""
+    corners, ends = np.unique(edges, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(corners),) * 2)
+    return connected_components(graph, directed=False)[0] if len(corners) else 0
 
 
 def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
