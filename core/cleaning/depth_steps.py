@@ -7,7 +7,7 @@ disparity, all steps are of one size, planes are planes, and what is beside a sa
 samples are moved onto quadrics, as noisy ones are in space.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -67,18 +67,20 @@ def find_frame(points: np.ndarray) -> Frame | None:
         low, pixel, high = np.percentile(apart[:, 1], (10, 50, 90))
         alike = (depth[beside[:, 1:]] == depth[:, None]).sum(axis=1) >= _BESIDE
         if max(high - pixel, pixel - low) <= _PIXELS * pixel and alike.mean() >= _AREAS:
-            return Frame(axis, frame.sign, float(pixel), frame.step)
+            return replace(frame, pixel=float(pixel))
     return None
 
 
 def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame | None]:
     """Points (n,3), input units, moved off the steps of the frame that they are, and that frame; the very array given
-    and None where they are none. No point moves by more than two steps, nor to more than twice its depth."""
-    frame = find_frame(points)
+    and None where they are none. No point moves by more than two steps, nor to more than twice its depth; one at the
+    origin, where cameras put pixels that they see nothing in, stays."""
+    row = np.flatnonzero(points.any(axis=1))
+    frame = find_frame(points[row])
     if frame is None:
         return points, None
-    progress, steps = Progress.of(progress), frame.seen(points)
-    moved, every = steps.copy(), np.arange(len(points))
+    progress, steps, placed = Progress.of(progress), frame.seen(points[row]), points.copy()
+    moved, every = steps.copy(), np.arange(len(row))
     for turn, k in enumerate(_NEIGHBOURS):
         part = progress.part(turn / len(_NEIGHBOURS), (turn + 1) / len(_NEIGHBOURS))
         moved += fit_quadrics(moved, every, k, part).step
@@ -87,7 +89,8 @@ def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame 
     moved = steps + way * np.minimum(1.0, _LONGEST / length)
     disparity = moved[:, frame.axis]
     np.maximum(disparity, steps[:, frame.axis] / _NO_FARTHER, out=disparity)
-    return frame.in_space(moved), frame
+    placed[row] = frame.in_space(moved)
+    return placed, frame
 
 
 def _unevenness(gaps):

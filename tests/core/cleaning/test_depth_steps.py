@@ -52,6 +52,14 @@ def test_depths_rounded_to_millimetres_are_in_steps_still():
     assert find_frame(points.astype(np.float64)).step == pytest.approx(STEP, rel=0.02)
 
 
+def test_pixels_that_see_nothing_are_at_the_origin_and_stay_there():
+    points = frame()[0]
+    moved, found = between_steps(np.vstack([np.zeros((1, 3)), points]))
+    assert found == find_frame(points)
+    np.testing.assert_array_equal(moved[0], 0)
+    np.testing.assert_array_equal(moved[1:], between_steps(points)[0])
+
+
 def contours(levels):
     turn = np.linspace(0, 2 * np.pi, 200, endpoint=False)
     return np.concatenate([[(h * np.cos(t), h * np.sin(t), h) for t in turn] for h in levels])
