@@ -35,12 +35,11 @@ def depth_images(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[np.n
 def _depth_image(mesh, direction, width, rng):
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     radius = np.linalg.norm(mesh.vertices - centre, axis=1).max()
-    right = np.cross(direction, _UP)
-    right /= np.linalg.norm(right)
+    right, aside = _across(direction, _UP)
     steps = radius * _WIDER * (2 * (np.arange(width) + 0.5) / width - 1)
     x, y = (grid.reshape(-1, 1) for grid in np.meshgrid(steps, steps))
     eye = centre + _AWAY * radius * direction
-    rays = centre + x * right + y * np.cross(direction, right) - eye
+    rays = centre + x * right + y * aside - eye
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     depth = first_hits(eye, rays, mesh).reshape(width, width)
     seen, mixed, flying = np.isfinite(depth), depth.copy(), np.zeros(depth.shape, bool)
@@ -88,9 +87,14 @@ def in_room(points: np.ndarray) -> np.ndarray:
 def _camera():
     """Unit vectors to the right of the camera, down and ahead, (3,3)."""
     ahead = _AHEAD / np.linalg.norm(_AHEAD)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(ahead, right), ahead])
+    return np.stack([*_across(ahead, (0.0, 0.0, 1.0)), ahead])
+
+
+def _across(direction, up):
+    """Two unit vectors at right angles to a unit `direction` and to each other, the first to `up` as well."""
+    first = np.cross(direction, up)
+    first /= np.linalg.norm(first)
+    return first, np.cross(direction, first)
 
 
 def depth_frame(mesh: Mesh, width: int, step: float, noise: float, rng: np.random.Generator) -> tuple[np.ndarray, ...]:

@@ -225,12 +225,11 @@ def picture(path: Path) -> Path:
     room = seen_from_one_spot(rooms.room().mesh, ROOM_POINTS[-1], ROOM_NOISE[-1], np.random.default_rng(0))[0]
     frame = depth_frame(before_camera(rooms.room().mesh), FRAME_WIDTH, *FRAME_SHOWN, np.random.default_rng(0))[0]
     given = (
-        ("depth images of a tangle", tangle, View(), panels[0, :2]),
-        ("a room from one spot", room, View((0.5, -1.0, 0.9)), panels[0, 2:]),
-        ("a frame of a depth camera", frame, View((-1.0, -0.3, 0.6)), panels[1, :2]),
+        ("depth images of a tangle", tangle, np.asarray, View(), panels[0, :2]),
+        ("a room from one spot", room, np.asarray, View((0.5, -1.0, 0.9)), panels[0, 2:]),
+        ("a frame of a depth camera", frame, in_room, View((-1.0, -0.3, 0.6)), panels[1, :2]),
     )
-    for name, points, view, (left, right) in given:
-        place = in_room if points is frame else np.asarray
+    for name, points, place, view, (left, right) in given:
         camera = view.camera(place(points), _PIXELS)
         draw_points(left, place(points), camera)
         caption(left, name, f"{len(points):,} points")

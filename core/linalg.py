@@ -111,6 +111,12 @@ def row_dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("...k,...k->...", a, b)
 
 
+def shortened(steps: np.ndarray, longest: float | np.ndarray) -> np.ndarray:
+    """Vectors (m,3), those that are longer than `longest`, (m,) or one for all, made as long as that."""
+    length = np.maximum(np.linalg.norm(steps, axis=1), np.finfo(float).tiny)
+    return steps * np.minimum(1.0, longest / length)[:, None]
+
+
 def lengths(a: np.ndarray) -> np.ndarray:
     """(m,) of vectors stored component by component, (3,m)."""
     return np.sqrt(np.einsum("im,im->m", a, a))

@@ -18,7 +18,7 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     Clean samples come back as they are, bit for bit.
     """
     progress = Progress.of(progress)
-    samples, stepped = _between_steps(samples, settings.denoise, progress.part(0.0, 0.1))
+    samples, stepped = _off_steps_of_depth(samples, settings.denoise, progress.part(0.0, 0.1))
     dropped = np.zeros(len(samples.points), bool)
     if settings.outliers:
         dropped = find_outliers(samples.points, progress.part(0.1, 0.3))
@@ -32,7 +32,7 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
 
 
-def _between_steps(samples, strength, progress):
+def _off_steps_of_depth(samples, strength, progress):
     """The samples moved off the steps of depth that they are in, where they are, and the largest of these."""
     if strength == 0:
         return samples, {}

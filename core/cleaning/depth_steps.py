@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import shortened
 from ..progress import Progress
 from .quadrics import fit_quadrics
 
@@ -84,9 +85,7 @@ def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame 
     for turn, k in enumerate(_NEIGHBOURS):
         part = progress.part(turn / len(_NEIGHBOURS), (turn + 1) / len(_NEIGHBOURS))
         moved += fit_quadrics(moved, every, k, part).step
-    way = moved - steps
-    length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
-    moved = steps + way * np.minimum(1.0, _LONGEST / length)
+    moved = steps + shortened(moved - steps, _LONGEST)
     disparity = moved[:, frame.axis]
     np.maximum(disparity, steps[:, frame.axis] / _NO_FARTHER, out=disparity)
     placed[row] = frame.in_space(moved)

@@ -7,6 +7,7 @@ noise breaks first. Robust quadrics through the neighbours need no diagram, and 
 import numpy as np
 
 from ..given_arrays import finite_points, spacing_of
+from ..linalg import shortened
 from ..progress import Progress
 from ..settings import Settings
 from .clusters import Clusters
@@ -47,9 +48,7 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     moved = points
     for turn, neighbours in enumerate(sizes):
         moved = _onto_quadrics(moved, noisy, neighbours, progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
-    step = strength * (moved - points)
-    length = np.linalg.norm(step, axis=1)
-    step *= np.minimum(1.0, LONGEST_MOVE * noise.level / np.maximum(length, np.finfo(float).tiny))[:, None]
+    step = shortened(strength * (moved - points), LONGEST_MOVE * noise.level)
     counts = {
         "noisy": int(noisy.sum()),
         "noise": float(np.median(noise.level[noisy])),

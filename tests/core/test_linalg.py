@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.linalg import eigenvalues, inner, outer, principal_axes, solve_positive, tangent_frames
+from core.linalg import eigenvalues, inner, outer, principal_axes, shortened, solve_positive, tangent_frames
 from tests.shapes import random_rotation
 
 
@@ -109,3 +109,9 @@ def test_frames_are_orthonormal(random):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     axes = np.concatenate([normals[:, None], tangent_frames(normals)], axis=1)
     np.testing.assert_allclose(axes @ axes.transpose(0, 2, 1), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)
+
+
+def test_long_vectors_are_shortened_and_short_ones_stay():
+    steps = np.array([[3.0, 4.0, 0.0], [0.3, 0.4, 0.0], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(shortened(steps, 1.0), [[0.6, 0.8, 0.0], steps[1], steps[2]], atol=1e-15)
+    np.testing.assert_array_equal(shortened(steps, np.array([5.0, 0.5, 0.0])), steps)

@@ -7,6 +7,7 @@ from ...field.blocks import each
 from ...field.grid import Grid, padding_cells
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
+from ...linalg import shortened
 from ...lookup import rows_of
 from ...progress import Progress
 from ..edges.first_steps import first_steps
@@ -130,7 +131,7 @@ def _shared(vertices, others):
 
 def _moved(vertices, step, level):
     """The vertices less the steps, shortened where they are very long."""
-    return vertices - step * np.minimum(1.0, _LONGEST_STEP * level / np.maximum(_length(step), np.finfo(float).tiny))
+    return vertices - shortened(step, _LONGEST_STEP * level)
 
 
 def _length(step):

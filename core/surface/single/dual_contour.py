@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
+from ...linalg import shortened
 from ...lookup import numbered
 from ...progress import Progress
 from ..edges.crossings import Crossings
@@ -37,8 +38,7 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     vertices = np.stack([np.bincount(corner, place[:, a], count) for a in range(3)], axis=1) / weight[:, None]
     meeting = kind > 0
     step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[meeting]
-    length = np.linalg.norm(step, axis=1, keepdims=True)
-    vertices[meeting] += step * np.minimum(1.0, grid.spacing / np.maximum(length, np.finfo(float).tiny))
+    vertices[meeting] += shortened(step, grid.spacing)
     free = kind < 2
     vertices = evened(vertices, quads, meeting)
     step = surface.project(vertices[free], progress.part(0.0, 0.7)).step

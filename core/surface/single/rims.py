@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ...field.local_surface import LocalSurface
-from ...linalg import COMPONENTS, cross, lengths, principal_axes, row_dots
+from ...linalg import COMPONENTS, cross, lengths, principal_axes, row_dots, shortened
 from ..mesh import Mesh, at_corners, edge_numbers
 from .rim_corners import Border
 
@@ -42,8 +42,7 @@ def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     way -= row_dots(way, axis)[:, None] * axis
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
     step = cell * way - surface.project(vertices[loop] + cell * way).step
-    length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), np.finfo(float).tiny)
-    vertices[loop] += step * np.minimum(1.0, _TO_RIM * cell / length)
+    vertices[loop] += shortened(step, _TO_RIM * cell)
     return vertices
 
 
@@ -71,8 +70,7 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     spacing = surface.spacing[surface.tree.query(vertices[loop], workers=-1)[1]]
     step = _fairing(Border(vertices, loop, beside), spacing, cell)
     step -= row_dots(step, axis)[:, None] * axis
-    length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(float).tiny)
-    vertices[loop] += step * np.minimum(1.0, _FARTHEST * spacing / length)[:, None]
+    vertices[loop] += shortened(step, _FARTHEST * spacing)
     _settle(vertices, loop, axis, surface)
 
     moved = vertices - mesh.vertices
