@@ -6,7 +6,7 @@ import pytest
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.edges.meeting_edges import _least
-from core.surface.edges.meetings import _goes_past, _grown, _linked, _of_lines, find_meetings
+from core.surface.edges.meetings import Meetings, _goes_past, _grown, _linked, _of_lines, find_meetings
 from core.surface.edges.sheets import sheets_near
 from tests import shapes
 
@@ -114,6 +114,15 @@ def test_squares_that_cross_askew_meet_along_their_line_only(degrees):
     assert meet.passing[(away < 1.5) & inside].all()
     assert not (meet.at | meet.passing)[away > 9].any()
     assert not meet.side_by_side
+
+
+@pytest.mark.parametrize(("through", "line", "expected"), [(12, False, True), (8, False, False), (8, True, True)])
+def test_few_samples_show_sheets_that_pass_through_each_other_only_along_a_line(through, line, expected):
+    """Of 2000, 20 at meetings, as at the ears and toes of a figure."""
+    number = np.arange(2000)
+    meet = Meetings(number < 20, number < through, number < 0, (number < 30) & line)
+    assert not meet.few
+    assert meet.pass_through is expected
 
 
 def test_samples_that_are_few_of_those_around_them_show_no_line():
