@@ -13,33 +13,29 @@ from .field.grid import Grid
 from .linalg import row_dots
 from .parallel import cores
 from .points import MINIMUM_SAMPLES
-from .settings import BESIDE_OFFSET, WITH_SIDES, Settings
+from .settings import BESIDE_OFFSET, Settings
 
 _CGROUP = Path("/sys/fs/cgroup")
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
 _BAND = 4.0  # cells, the band that is advised at least
 
-# Fitted to 57 runs over 500 to 100,000 samples at resolutions of 64 to 256 and to 90 over 20 to 20,000, which held .4
-# to 1.5 times as much, 95 % of them less than 1.4, least sure for sparse samples: the Voronoi diagram by samples, the
-# field by nodes, the meshes by nodes and by squared cells of the surface. One is over before the next begins.
-_MEMORY = {"diagram": 35.0, "sample": 2.4e-3, "field": 43.0, "node": 31e-6, "meshes": 65.0, "held node": 10e-6}  # MiB
+# Fitted to 154 runs over 100 to 290,000 samples at resolutions of 64 to 512, in a band or not, which held .55 to 1.6
+# times as much, nine tenths of them .8 to 1.4: the Voronoi diagram by samples, the field by nodes, the meshes by nodes
+# and by squared cells of the surface, in a band both by the latter. One is over before the next begins.
+_MEMORY = {"diagram": 33.0, "sample": 2e-3, "field": 20.0, "node": 31e-6, "meshes": 52.0, "held node": 2.2e-6}  # MiB
+_SQUARED_CELL = 4.9e-3  # MiB
+_BAND_MEMORY = {"field": 110.0, "surface": 3.4e-3}  # MiB
 _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
 _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
-_MESHES = {"none": 0.0, "double": 3.3e-3, "single": 3.2e-3, "both": 5e-3, "signed": 4.5e-3}
-_SPARSE = 25.0  # squared cells of the surface for each sample; a single layer is often torn then, and a cover looked at
 
-# The same in a band, at resolutions of 256 to 1024: by squared cells of the surface, with sides told apart or not.
-_BAND_MEMORY = {"field": 60.0, "surface": 3.2e-3, "surface with sides": 3.6e-3}  # MiB
-_BAND_NEAR = 3.7, 1 / 8  # cells from the surface that all nodes are projected in, and share of the others that is
-
-# Processor seconds where the probe takes _PROBE of them; fitted to the same runs, within .6 to 1.6 of what they
-# took; what a band takes to five at resolutions up to 512, and noise to eight clouds.
-_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.36, 6e-5, 1e-4
-_NEAR_NODE, _NODE = 2e-6, 4.7e-8
-_BAND_NEAR_NODE, _BAND_NODE = 4.8e-6, 1.5e-6
-_COVER, _SIDES = 3.4e-5, 4.9e-5  # for a squared cell of the surface: its double cover alone, and a single layer
-_PROBE = 0.0042
+# Processor seconds where the probe takes _PROBE of them; fitted to the same runs, which took .55 to 1.75 times as much,
+# nine tenths of them .7 to 1.5: shapes whose sheets run close to each other most, plain ones least.
+_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.37, 1.3e-4, 1.5e-4
+_NEAR_NODE, _NODE, _BAND_NEAR_NODE = 4.3e-6, 6.3e-8, 1.26e-5
+_MESHES = 3.7e-5  # for a squared cell of the surface
+_BAND_NEAR = 3.7, 1 / 8  # cells from the surface in a band, where all nodes are projected, and the share of others
+_PROBE = 0.0045
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
@@ -56,21 +52,20 @@ class Estimate:
 
 def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False) -> Estimate:
     """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
-    settings the resolution, the band, the kind of surface and, for the memory, solver and integration count.
+    settings the resolution, the band, whether there is a surface and, for the memory, solver and integration count.
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
     """
     cells, nodes = spacing / grid.spacing, float(np.prod(grid.shape))
-    area, sides = float(np.sum(cells**2)), settings.surface in WITH_SIDES
-    work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing)
-    work += area * (_SIDES if sides else _COVER * (settings.surface == "double"))
+    area = float(np.sum(cells**2))
+    work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing) + area * _MESHES * (settings.surface != "none")
     if settings.band is None:
         near = min(nodes, 2.0 * float(np.sum(cells**2 * (_NEAR + cells))))
         work += _NEAR_NODE * near + _NODE * nodes
     else:
         width, share = _BAND_NEAR
         near = min(nodes, 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells)))))
-        work += _BAND_NEAR_NODE * near + _BAND_NODE * 2.0 * area * settings.band
+        work += _BAND_NEAR_NODE * near
     probe, busy = _probe()
     cpu = work * probe / _PROBE
     return Estimate(_CORES * busy * cpu, _memory(len(spacing), area, nodes, settings), cpu)
@@ -121,13 +116,11 @@ def _memory(samples, area, nodes, settings):
     least, each = _by_samples(settings)
     diagram, by_cores = least + each * samples, _by_cores()
     if settings.band is not None:
-        kind = "surface with sides" if settings.surface in WITH_SIDES else "surface"
-        return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY[kind] * area)
+        return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY["surface"] * area)
     node = _POISSON_NODE if settings.integration == "poisson" else _MEMORY["node"]
     field = _MEMORY["field"] + node * nodes
-    kind = "both" if settings.surface == "single" and area > _SPARSE * samples else settings.surface
-    meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _MESHES[kind] * area
-    return by_cores + max(diagram, field, meshes)
+    meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _SQUARED_CELL * area
+    return by_cores + max(diagram, field, meshes * (settings.surface != "none"))
 
 
 def _by_cores():

