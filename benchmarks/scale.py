@@ -1,4 +1,5 @@
-"""docs/scale.md: `python -m benchmarks.scale FOLDER` measures how cost grows with the grid and with the points."""
+"""docs/scale.md: `python -m benchmarks.scale FOLDER` measures how cost grows with the grid and with the points, and how
+surfaces come closer on finer grids."""
 
 import platform
 import sys
@@ -9,10 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from core import Settings, reconstruct
+from core.budget import SUITED
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 from core.memory import peak_memory_mb
 
+from . import detail
 from .cases import find_cases, load_case
 from .geometry import surface_points
 from .peers import Clock, check_open3d, poisson
@@ -65,6 +68,14 @@ as many cells, the box eight times as many. From {few:,} to {points:,} points at
 grows as the number of points to the power of **{by_points:.2f}**.
 
 {open3d}
+
+## Which resolution
+
+Chamfer distance × 10³ of the double cover where the points of a case are so many cells apart in the median, and
+in brackets the resolution for that. In bold: {suited:g} cells, whose resolution `info` and Estimate Cost say suits the
+points. {closer}
+
+{detail}
 """
 
 
@@ -74,7 +85,7 @@ def main(arguments: list[str] | None = None) -> int:
         arguments,
         "scale",
         "Measure runs on large grids, in the whole box and in bands, and write docs/scale.md.",
-        f"holds the case {SHAPE}.npz",
+        f"holds the cases {', '.join(detail.CASES)}",
         lambda folder: write_page(measure(folder), DOCS),
     )
 
@@ -82,17 +93,18 @@ def main(arguments: list[str] | None = None) -> int:
 def measure(folder: Path) -> dict:
     """Everything that the page shows, printing what is done as it finishes."""
     check_open3d()
-    (path,) = find_cases(folder, [SHAPE])
+    (path,), cases = find_cases(folder, [SHAPE]), find_cases(folder, detail.CASES)
     return {
         "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
         "runs": list(_said(run_cost, path, RUNS)),
         "open3d": list(_said(open3d_cost, path, [(count,) for count in COUNTS])),
+        "detail": [row for case in cases for row in _said(detail.detail, case, [(apart,) for apart in detail.APART])],
     }
 
 
 def _said(function, path, rows) -> Iterator[dict]:
     for row in rows:
-        print(function.__name__, *row, flush=True)
+        print(function.__name__, path.stem, *row, flush=True)
         yield run_fresh(function, path, *row)
 
 
@@ -165,6 +177,9 @@ def write_page(measured: dict, docs: Path) -> Path:
         memory=_exponent(coarse, fine, "resolution", "peak_memory_mb"),
         by_points=_exponent(few, many, "points", "cpu"),
         open3d=_open3d(measured),
+        suited=SUITED,
+        detail=detail.detail_table(measured["detail"]),
+        closer=detail.detail_verdict(measured["detail"]),
     )
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -9,14 +9,15 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .errors import MemoryBudgetError
-from .field.grid import Grid
+from .field.grid import Grid, fit_grid
 from .linalg import row_dots
 from .parallel import cores
 from .points import MINIMUM_SAMPLES
-from .settings import BESIDE_OFFSET, Settings
+from .settings import BESIDE_OFFSET, Settings, options
 
 _CGROUP = Path("/sys/fs/cgroup")
 FREE_SHARE = 0.7  # of the free memory, where no limit is set
+SUITED = 1.5  # cells between points that show their detail; see docs/scale.md
 _BAND = 4.0  # cells, the band that is advised at least
 
 # Fitted to 154 runs over 100 to 290,000 samples at resolutions of 64 to 512, in a band or not, which held .55 to 1.6
@@ -69,6 +70,15 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
     probe, busy = _probe()
     cpu = work * probe / _PROBE
     return Estimate(_CORES * busy * cpu, _memory(len(spacing), area, nodes, settings), cpu)
+
+
+def suited_resolution(points: np.ndarray, spacing: np.ndarray) -> int:
+    """The resolution, within its limits, at which samples (n,3), or the corners of the box around them, with local
+    spacing (n,), lie a cell and a half apart in the median. Coarser grids lose some of what points show, most where
+    sheets run close; finer ones show hardly more (measured in docs/scale.md)."""
+    low, high = options()["resolution"].metadata["limits"]
+    resolution = SUITED * low * fit_grid(points, low).spacing / np.median(spacing)
+    return round(float(np.clip(resolution, low, high)))
 
 
 def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: Settings) -> tuple[str, ...]:

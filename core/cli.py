@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from tqdm import tqdm
 
-from .budget import estimate_cost
+from .budget import SUITED, estimate_cost, suited_resolution
 from .cleaning.noise import looks_noisy
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
@@ -284,6 +284,7 @@ def _info(given):
         "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
         "spacing": np.median(spacing),
         "resolution": settings.resolution,
+        "suited_resolution": suited_resolution(used, spacing),
         "band": settings.band,
         "grid": {"shape": grid.shape, "cell": grid.spacing},
         "noisy": noisy,
@@ -305,6 +306,7 @@ def _described(facts):
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"
         f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes{band}\n"
+        f"suits    resolution {facts['suited_resolution']}, at which points are {SUITED:g} cells apart\n"
         f"run      about {cost['seconds']:.0f} s and {cost['memory_mb']:.0f} MiB; {cost['cpu_seconds']:.0f} s of the "
         f"processor{', as it looks noisy' if facts['noisy'] else ''}"
     )

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.budget import advised_band, estimate_cost
+from ..core.budget import advised_band, estimate_cost, suited_resolution
 from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
 from ..core.points import local_spacing, prepare_samples
 from ..core.progress import Progress
-from ..core.settings import WHOLE_BOX, Settings, options
+from ..core.settings import WHOLE_BOX, Settings
 from . import points_in, status
 from .properties import chosen, settings_from
 from .run import percentage
@@ -37,10 +37,8 @@ class Points:
         return cls(corners, spacing, samples.scale, looks_noisy(samples.points, spacing))
 
     def suits(self) -> int:
-        """The resolution at which a cell is as large as the points are apart."""
-        low, high = options()["resolution"].metadata["limits"]
-        resolution = low * fit_grid(self.corners, low).spacing / np.median(self.spacing)
-        return round(float(np.clip(resolution, low, high)))
+        """The resolution at which the points are a cell and a half apart."""
+        return suited_resolution(self.corners, self.spacing)
 
     def cost(self, settings: Settings) -> list[str]:
         """Lines on these points and on the time and memory that `settings` would take."""
@@ -116,7 +114,7 @@ class VAD_OT_estimate(bpy.types.Operator):
 
 
 class VAD_OT_use_resolution(bpy.types.Operator):
-    """Take the resolution at which a cell is as large as the points are apart: finer ones show hardly more detail.
+    """Take the resolution at which the points are a cell and a half apart: finer ones show hardly more detail.
     Where the whole box would be too much, take a band, too"""
 
     bl_idname = "vad.use_resolution"

@@ -26,7 +26,8 @@ from .single.single_layer import sheet_of_crossings, sheet_of_sides
 
 _TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
 _ASKEW = 0.1  # of the area of a single layer, the same where faces are turned away from the samples
-_BETTER = 0.5  # times that misfit, below which the double cover is taken
+_BETTER = 0.5  # times that misfit, below which the other one is taken
+_MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
 _OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples that are, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
@@ -127,12 +128,24 @@ class _Layers:
 
     @cached_property
     def cover(self) -> Mesh:
-        """The double cover: both sides of the single layer, where these are the whole surface; without the pockets of a
-        few faces that may be left along the lines where sheets meet."""
+        """The double cover: both sides of the single layer, where these are the whole surface, or where the one
+        extracted is torn, as on grids so coarse that it merges sheets, and they are not."""
         if self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1:
-            cover = both_sides(self.single[0], self.grid.spacing)
-            return cover if self.sheet is not None else pieces_with_samples(cover, self.local.tree, self.grid.spacing)
-        return self.extracted
+            return self._both_sides()
+        return self._both_sides() if self._is_sheet_better() else self.extracted
+
+    def _is_sheet_better(self):
+        """Whether the extracted double cover is torn, and the single layer is not."""
+        if self.local.spacing_in_cells(self.grid) > _SPARSEST:
+            return False
+        misfit = self._fit(self.extracted)[0]
+        return misfit > _MERGED and self._fit(self.single[0])[0] < _BETTER * misfit
+
+    def _both_sides(self):
+        """Those of the single layer, without the pockets of a few faces that may be left along the lines where sheets
+        meet."""
+        cover = both_sides(self.single[0], self.grid.spacing)
+        return cover if self.sheet is not None else pieces_with_samples(cover, self.local.tree, self.grid.spacing)
 
     @cached_property
     def extracted(self) -> Mesh:
@@ -201,7 +214,8 @@ def extract_surfaces(
     The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
     other and it does not show where, or sheets run side by side, or meet where samples do not show it, or samples are
     sparse, or so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets
-    run close; then it is extracted at an offset, see :mod:`.double.double_cover`.
+    run close; then it is extracted at an offset, see :mod:`.double.double_cover`, if that does not merge sheets that
+    the single layer parts.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,

@@ -14,7 +14,7 @@ def test_the_estimate_names_points_resolution_time_and_memory(blender, extension
     count, apart = re.fullmatch(r"([\d,]+) points, ([\d.]+) apart", lines[0]).groups()
     assert count == "1,000"
     assert float(apart) == pytest.approx(50 * 0.112, rel=0.3)  # sqrt(4 pi / 1000), about, less for uneven points
-    assert points.suits() == pytest.approx(1.25 * 2 * 50 / float(apart), rel=0.05)
+    assert points.suits() == pytest.approx(1.5 * 1.25 * 2 * 50 / float(apart), rel=0.05)
     assert lines[1] == f"Suits: resolution {points.suits()}"
     assert re.fullmatch(r"At 100: [\dhmins ]+, \d+ MiB", lines[2])
 

@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from benchmarks import scale
+from benchmarks import detail, scale
+from benchmarks.catalogue import make_case
 from benchmarks.scale import COUNTS, POINTS, RUNS, verdicts, write_page
 
 
@@ -20,7 +21,12 @@ def made_up():
             | dict(estimate=dict(seconds=1.0, memory_mb=1.1 * peak))
         )
     peers = [dict(points=count, seconds=1.0, cpu=2.0, peak_memory_mb=50.0) for count in COUNTS]
-    return {"versions": {"Python": "3"}, "runs": runs, "open3d": peers}
+    rows = [
+        dict(case=case, apart=apart, resolution=100, cd=cd / apart)
+        for case, cd in (("a", 1), ("b", 2))
+        for apart in detail.APART
+    ]
+    return {"versions": {"Python": "3"}, "runs": runs, "open3d": peers, "detail": rows}
 
 
 def test_the_page_shows_every_run_and_the_growth(tmp_path):
@@ -30,6 +36,20 @@ def test_the_page_shows_every_run_and_the_growth(tmp_path):
     assert "power of **2.00** (field) and **2.00** (whole run)" in text
     assert "number of points to the power of **0.50**" in text
     assert "| 1024^3 | 4 |" in text
+
+
+def test_detail_is_shown_by_case_and_compared(tmp_path):
+    text = write_page(made_up(), tmp_path).read_text()
+    assert "| case | 0.75 | 1 | **1.5** | 2 | 3 |" in text
+    assert "| b | 2.667 (100) | 2.000 (100) | 1.333 (100) | 1.000 (100) | 0.667 (100) |" in text
+    assert "is 0.67 to 0.67 of that at one, and at 3 cells 0.50 to 0.50 of that at 1.5" in text
+
+
+def test_detail_is_measured_where_points_are_so_far_apart(tmp_path):
+    path = make_case(tmp_path, "hemisphere_2k")
+    coarse, fine = (detail.detail(path, apart) for apart in (0.75, 1.5))
+    assert fine["resolution"] == pytest.approx(2 * coarse["resolution"], abs=1)
+    assert 0 < fine["cd"] < coarse["cd"]
 
 
 def test_verdicts_follow_the_numbers():

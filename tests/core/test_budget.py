@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core import Settings, VADError, reconstruct
-from core.budget import Estimate, _probe, check_budget, estimate_cost, free_memory_mb
+from core.budget import Estimate, _probe, check_budget, estimate_cost, free_memory_mb, suited_resolution
 from core.cleaning.noise import looks_noisy
 from core.cli import main
 from core.errors import MemoryBudgetError
@@ -119,6 +119,17 @@ def test_the_message_names_the_need_the_limit_and_a_resolution_that_fits():
     assert reconstruct(POINTS, Settings(resolution=32, memory_limit=300, surface="none")).field.values.size
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
+def test_at_the_suited_resolution_points_are_a_cell_and_a_half_apart(scale):
+    points = scale * POINTS
+    spacing = local_spacing(points)
+    resolution = suited_resolution(points, spacing)
+    cell = fit_grid(points, resolution).spacing
+    assert np.median(spacing) == pytest.approx(1.5 * cell, rel=0.02)
+    assert suited_resolution(points, 1e-6 * spacing) == 2048
+    assert suited_resolution(points, 1e6 * spacing) == 16
+
+
 def test_in_a_band_cost_grows_with_the_surface():
     coarse, fine = (cost(POINTS, resolution, band=4)[0] for resolution in (512, 2048))
     assert 12 < (fine.memory_mb - 110) / (coarse.memory_mb - 110) < 17
@@ -223,4 +234,6 @@ def test_the_command_line_ends_with_status_3_and_writes_nothing(tmp_path, capsys
 def test_info_tells_both(tmp_path, capsys):
     np.save(tmp_path / "ball.npy", POINTS)
     assert main(["info", str(tmp_path / "ball.npy"), "--resolution", "96"]) == 0
-    assert " s and " in capsys.readouterr().out.splitlines()[-1]
+    *_, suits, run = capsys.readouterr().out.splitlines()
+    assert " s and " in run
+    assert f"resolution {suited_resolution(POINTS, local_spacing(POINTS))}, at which points are 1.5 cells" in suits
