@@ -17,11 +17,11 @@ from ...linalg import dots, row_dots
 from ...lookup import numbered
 from ...parallel import even_chunks, in_order, over_rows
 from ...progress import Progress
+from .sheets import SIDE_BY_SIDE
 
 NEIGHBOURS = 32
 _LINKED = 0.8  # least confidence of samples that link others
-_SIDE_BY_SIDE = 0.9  # least |n_i . n_j| of sheets that run side by side
-_ASKEW = float(np.sqrt(1 - _SIDE_BY_SIDE**2))  # least sine between others
+_ASKEW = float(np.sqrt(1 - SIDE_BY_SIDE**2))  # least sine between others
 _WIDER, _CLOSE = 120, 60  # samples among which a sheet is followed, and close by where it meets another squarely
 _STRAIGHT, _FAR = 0.5, 4.0  # least membership of those it is followed over; local spacings, up to where
 _PAST = 1.0  # local spacings along itself that a sheet goes on, on either side of the other
@@ -83,13 +83,13 @@ def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
         return Meetings(*np.zeros((4, n), bool))
     apart = ~_linked(i, j, nearest, alike, surface.confidence >= _LINKED)
     cosine = np.abs(row_dots(surface.normals[i], surface.normals[j]))
-    askew = np.flatnonzero(apart & (cosine <= _SIDE_BY_SIDE))
+    askew = np.flatnonzero(apart & (cosine <= SIDE_BY_SIDE))
     past, close = _goes_past(i[askew], j[askew], surface)
     apart[askew] = past > 0
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
     at = _grown(*((found >= _LEAST) & (found >= share * pairs) for share in (_SHARE, _WEAK)), nearest)
     through = _among(n, i[askew][close == 2], j[askew][close == 2])
-    side_by_side = apart & (cosine > _SIDE_BY_SIDE)
+    side_by_side = apart & (cosine > SIDE_BY_SIDE)
     beside = at & _among(n, i[side_by_side], j[side_by_side])
     return Meetings(at, through, beside, _of_lines(through, nearest)[nearest[:, :_PASSING]].any(axis=1))
 

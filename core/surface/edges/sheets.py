@@ -18,8 +18,8 @@ from ...progress import Progress
 _NEAREST = 16  # samples of a node
 _SHEETS = 3  # of a node, at first
 REACH = 1.6  # cells, from a node to a sheet that counts
-_SIDE_BY_SIDE, _LIKELY = 0.9, 0.6  # least |n . n'| and confidence of samples of such sheets beside the first
-_ROUNDS = 1
+SIDE_BY_SIDE = 0.9  # least |n . n'| of sheets that run side by side
+_LIKELY = 0.6  # least confidence of samples of such sheets beside the first
 _SAME_ANGLE, _SAME_FOOT = 0.9, (0.25, 0.1)  # cosine; cells or local spacings, whichever is more
 STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
 ALIKE = 0.6  # least cosine between the axes of one sheet at neighbouring nodes
@@ -76,11 +76,8 @@ def sheets_near(
     found = [sheets for _, sheets in in_order(lambda part: _sheets_of(surface, x, part), chunks)]
     sheets = found[0].joined(*found[1:])
     sheets = _distinct(sheets[np.abs(sheets.tau) <= REACH * cell], surface, len(x), cell)
-    for _ in range(_ROUNDS):
-        tell = partial(_told, sheets, surface, x, cell)
-        told = [found for _, found in in_order(tell, neighbours)]
-        sheets = _distinct(sheets.joined(*told), surface, len(x), cell)
-    return sheets
+    told = [found for _, found in in_order(partial(_told, sheets, surface, x, cell), neighbours)]
+    return _distinct(sheets.joined(*told), surface, len(x), cell)
 
 
 def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray]:
@@ -99,7 +96,7 @@ def _sheets_of(surface, x, part):
     rest[:, 0] |= ~rest.any(axis=1)
     normals = surface.normals[sample]
     own = normals[np.arange(len(part)), rest.argmax(axis=1)]
-    beside = np.abs(np.einsum("mki,mi->mk", normals, own)) > _SIDE_BY_SIDE
+    beside = np.abs(np.einsum("mki,mi->mk", normals, own)) > SIDE_BY_SIDE
     rest |= beside & (surface.confidence[sample] >= _LIKELY)
     near, row, found = seen_from(surface, x[part], sample, distance), np.arange(len(part)), []
     for _ in range(_SHEETS):
