@@ -64,7 +64,7 @@ class Meetings:
     @property
     def side_by_side(self) -> bool:
         """Whether sheets run so close beside each other that single layers are torn there."""
-        return self._share(self.beside) > _BESIDE
+        return not self.few and bool(self._share(self.beside) > _BESIDE)
 
     def _share(self, some):
         return some.sum() / max(self.at.sum(), 1)

@@ -125,6 +125,14 @@ def test_few_samples_show_sheets_that_pass_through_each_other_only_along_a_line(
     assert meet.pass_through is expected
 
 
+@pytest.mark.parametrize(("at", "beside", "expected"), [(20, 2, True), (20, 1, False), (9, 9, False)])
+def test_few_samples_show_no_sheets_side_by_side(at, beside, expected):
+    """Of 2000: as few as are at meetings by chance on rugged ground had its single layer taken for a torn one."""
+    number = np.arange(2000)
+    meet = Meetings(number < at, number < 0, number < beside, number < 0)
+    assert meet.side_by_side is expected
+
+
 def test_samples_that_are_few_of_those_around_them_show_no_line():
     """Along a row of samples, each beside the twelve next to it."""
     n = 200
