@@ -7,6 +7,7 @@ from .alone import WITHIN
 from .cases import SPOILED
 from .peers import PEERS
 from .report import ABSENT
+from .tables import markdown_rows
 
 WORSE_BY = 1.3  # of the best peer's CD, at most
 SHARE = 0.85  # of the clean cases, at least, with the lowest CD
@@ -178,4 +179,4 @@ def _titles(results):
 
 
 def _markdown(lines):
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_rows(lines)

@@ -3,11 +3,12 @@
 from pathlib import Path
 
 from core import Settings, reconstruct
-from core.budget import SUITED, suited_resolution
+from core.budget import SUITED, advised_band, suited_resolution
 from core.points import local_spacing, prepare_samples
 
 from .cases import load_case
 from .metrics import surface_errors
+from .tables import markdown_rows
 
 CASES = (  # of many kinds
     "spot_10k",
@@ -21,7 +22,7 @@ CASES = (  # of many kinds
     "spot_noise0.5_10k",
 )
 APART = 0.75, 1.0, SUITED, 2.0, 3.0  # cells between points
-_WHOLE, _BAND = 256, 4.0  # the finest resolution in the whole box, and cells of the band beyond it
+_WHOLE = 256  # the finest resolution in the whole box; beyond it in a band
 
 
 def detail(path: Path, apart: float) -> dict:
@@ -29,7 +30,8 @@ def detail(path: Path, apart: float) -> dict:
     case = load_case(path)
     samples = prepare_samples(case.points).points
     resolution = round(suited_resolution(samples, local_spacing(samples)) * apart / SUITED)
-    settings = Settings(resolution=resolution, band=None if resolution <= _WHOLE else _BAND)
+    band = None if resolution <= _WHOLE else advised_band(Settings().offset)
+    settings = Settings(resolution=resolution, band=band)
     errors = surface_errors(reconstruct(case.points, settings).surface, case.truth)
     return {"case": path.stem, "apart": apart, "resolution": resolution, **errors}
 
@@ -41,7 +43,7 @@ def detail_table(rows: list[dict]) -> str:
     for name in dict.fromkeys(row["case"] for row in rows):
         found = {row["apart"]: f"{row['cd']:.3f} ({row['resolution']})" for row in rows if row["case"] == name}
         lines.append([name, *(found[apart] for apart in APART)])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_rows(lines)
 
 
 def detail_verdict(rows: list[dict]) -> str:

@@ -3,6 +3,7 @@
 from .field_cost import PUBLISHED_FIELD, PUBLISHED_NORMALS
 from .field_metrics import RIM_STEPS
 from .report import ABSENT, Column, markdown_table
+from .tables import markdown_rows
 
 WAYS = {
     "ours": "ours",
@@ -137,7 +138,7 @@ def _number(value, form):
 
 def _table(heads, lines):
     numeric = ["---" if line_is_text else "---:" for line_is_text in _texts(lines)]
-    return "\n".join(f"| {' | '.join(row)} |" for row in [heads, numeric, *lines])
+    return markdown_rows([heads, numeric, *lines])
 
 
 def _texts(lines):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from . import noise_uneven, published
+from .tables import markdown_rows
 
 _LINE = 160  # characters of a message that is shown
 
@@ -178,4 +179,4 @@ def listed(names):
 
 def markdown(lines):
     head, *rest = lines
-    return "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---"] * len(head), *rest])
+    return markdown_rows([head, ["---"] * len(head), *rest])

@@ -30,6 +30,7 @@ from .peers import check_open3d
 from .plots import plot_convergence, plot_growth
 from .report import Column, markdown_table
 from .status import page_command, said
+from .tables import markdown_rows
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -289,7 +290,7 @@ def _cost_table(runs):
 
 
 def _markdown(lines):
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_rows(lines)
 
 
 def _triple(weights):

@@ -11,6 +11,7 @@ from .cases import SAMPLINGS
 from .published import CATEGORIES, NON_WATERTIGHT, NORMALS, WATERTIGHT
 from .report import ABSENT, read_run
 from .status import DONE, exit_status
+from .tables import markdown_rows
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = {"results": "measured", "bench": "made by script"}
@@ -192,7 +193,7 @@ def _errors(result):
 
 
 def _markdown(lines):
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_rows(lines)
 
 
 if __name__ == "__main__":

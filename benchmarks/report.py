@@ -8,6 +8,8 @@ from pathlib import Path
 
 from core import InputError
 
+from .tables import markdown_rows
+
 ABSENT = "–"
 _NAME_WIDTH = 20
 _TOLERANCE = 0.02
@@ -157,7 +159,7 @@ def markdown_table(results: list[dict], columns: list[Column]) -> str:
         else:
             rows.append([result["case"], *(c.cell(c.values(result)) for c in columns)])
     rows.append(["*median*", *(_median_cell(c, results) for c in columns)])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_rows(rows)
 
 
 def _median_cell(column, results):

@@ -21,6 +21,7 @@ from .geometry import surface_points
 from .peers import Clock, check_open3d, poisson
 from .processes import run_fresh
 from .status import page_command
+from .tables import markdown_rows
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -245,7 +246,7 @@ def _runs(measured):
         ratio, peak = f"{run['cpu'] / peers[run['points']]:.2f}", f"{run['peak_memory_mb']:,.0f}"
         what = f"{run['points']:,}", f"{run['resolution']}^3", band, run["surface"]
         lines.append([*what, *numbers, ratio, peak, share, f"{run['faces']:,}"])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_rows(lines)
 
 
 def _open3d(measured):

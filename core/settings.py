@@ -15,7 +15,6 @@ from .field.grid import padding_cells
 
 WHOLE_BOX = 512  # cells, the finest resolution without a band
 BESIDE_OFFSET = 2  # cells that a band reaches beyond the offset, at least
-WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 
 
 def _option(default, help, *, limits=None, choices=None, word=None, unit=""):

@@ -10,7 +10,7 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
-from ..settings import WITH_SIDES, Settings
+from ..settings import Settings
 from .double.both_sides import both_sides
 from .double.double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
 from .double.ridges import ridge_share
@@ -24,6 +24,7 @@ from .signed import signed_distance, signed_mesh
 from .signs.sides import Sides, find_sides, may_be_closed, needed_band
 from .single.single_layer import sheet_of_crossings, sheet_of_sides
 
+_WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
 _ASKEW = 0.1  # of the area of a single layer, the same where faces are turned away from the samples
 _BETTER = 0.5  # times that misfit, below which the other one is taken
@@ -60,7 +61,7 @@ class Surfaces:
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
     needed = settings.band
-    if settings.surface in WITH_SIDES or (settings.surface == "double" and local.spacing_in_cells(grid) <= _SPARSEST):
+    if settings.surface in _WITH_SIDES or (settings.surface == "double" and local.spacing_in_cells(grid) <= _SPARSEST):
         needed = max(needed, needed_band(local, grid))
     if settings.surface in ("double", "both", "single"):
         needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
@@ -130,9 +131,8 @@ class _Layers:
     def cover(self) -> Mesh:
         """The double cover: both sides of the single layer, where these are the whole surface, or where the one
         extracted is torn, as on grids so coarse that it merges sheets, and they are not."""
-        if self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1:
-            return self._both_sides()
-        return self._both_sides() if self._is_sheet_better() else self.extracted
+        whole = self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1
+        return self._both_sides() if whole or self._is_sheet_better() else self.extracted
 
     def _is_sheet_better(self):
         """Whether the extracted double cover is torn, and the single layer is not."""
