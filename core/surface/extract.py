@@ -18,18 +18,15 @@ from .edges.crossings import Crossings, find_crossings
 from .edges.meetings import Meetings, find_meetings
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
-from .meshing.misfit import askew, distances
+from .meshing.misfit import OFF, misfit
 from .meshing.pieces import pieces_touch, pieces_with_samples, without_small_pieces
 from .signed import signed_distance, signed_mesh
 from .signs.sides import Sides, find_sides, may_be_closed, needed_band
-from .single.single_layer import sheet_of_crossings, sheet_of_sides
+from .single.single_layer import BETTER, sheet_between_sides, sheet_of_crossings, sheet_of_sides
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
-_TORN = 0.07  # cells, mean distance of the samples to a single layer beyond which the double cover is looked at
-_ASKEW = 0.1  # of the area of a single layer, the same where faces are turned away from the samples
-_BETTER = 0.5  # times that misfit, below which the other one is taken
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
-_OFF, _SOME = 0.5, 0.02  # cells off a single layer, and share of the samples that are, above which it is said
+_SOME = 0.02  # share of the samples that a single layer misses, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
@@ -94,10 +91,17 @@ class _Layers:
         return find_sides(self.values, self.crossings, self.local, self.grid, part)
 
     @cached_property
+    def between(self) -> Mesh | None:
+        """What lies between the two sides of a surface that bounds no inside."""
+        part = self.progress.part(0.3, 0.5, "single layer")
+        given = self.values, self.band, self.crossings, self.sides, self.local, self.grid
+        return sheet_between_sides(*given, part)
+
+    @cached_property
     def sheet(self) -> Mesh | None:
         """The single layer of a surface with two sides."""
         part = self.progress.part(0.3, 0.5, "single layer")
-        return sheet_of_sides(self.values, self.band, self.crossings, self.sides, self.local, self.grid, part)
+        return sheet_of_sides(self.values, self.crossings, self.sides, self.local, self.grid, self.between, part)
 
     @cached_property
     def single(self) -> tuple[Mesh, int]:
@@ -105,27 +109,22 @@ class _Layers:
         if self.sheet is not None:
             return self.sheet, 0
         part = self.progress.part(0.5, 0.7, "single layer")
-        given = self.values, self.band, self.crossings, self.local, self.grid
+        given = self.values, self.band, self.crossings, self.local, self.grid, self.between
         return sheet_of_crossings(*given, lambda: self.extracted, part)
 
     @cached_property
     def fit(self) -> tuple[float, float]:
-        """Misfit of the single layer, which is torn beyond 1, and share of the samples that are off it; 0 where it
-        bounds the inside."""
+        """:func:`misfit` of the single layer; 0 where it bounds the inside."""
         return (0.0, 0.0) if self.sides.complete else self._fit(self.single[0])
 
     def _fit(self, mesh):
-        """How far samples are off a mesh, or how much of it is turned away from them, whichever is worse, as
-        its misfit; and the share of the samples that are off it."""
-        off = distances(mesh, self.local.points) / self.grid.spacing
-        turned = askew(mesh, self.local.tree, self.local.normals)
-        return max(off.mean() / _TORN, turned / _ASKEW), (off > _OFF).mean()
+        return misfit(mesh, self.local, self.grid.spacing)
 
     @property
     def is_cover_better(self) -> bool:
         """Whether the single layer is torn, and the double cover is not."""
-        misfit = self.fit[0]
-        return misfit > 1 and self._fit(self.cover)[0] < _BETTER * misfit
+        worst = self.fit[0]
+        return worst > 1 and self._fit(self.cover)[0] < BETTER * worst
 
     @cached_property
     def cover(self) -> Mesh:
@@ -138,8 +137,8 @@ class _Layers:
         """Whether the extracted double cover is torn, and the single layer is not."""
         if self.local.spacing_in_cells(self.grid) > _SPARSEST:
             return False
-        misfit = self._fit(self.extracted)[0]
-        return misfit > _MERGED and self._fit(self.single[0])[0] < _BETTER * misfit
+        worst = self._fit(self.extracted)[0]
+        return worst > _MERGED and self._fit(self.single[0])[0] < BETTER * worst
 
     def _both_sides(self):
         """Those of the single layer, without the pockets of a few faces that may be left along the lines where sheets
@@ -167,7 +166,9 @@ class _Layers:
                 return bool(self.meetings.passing.any())
             if self.local.confidence[self.meetings.through].mean() < _CLEAN:
                 return False
-        return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
+        if not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid):
+            return True
+        return self.sheet is not None
 
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
@@ -235,7 +236,7 @@ def extract_surfaces(
             warnings.append(_said_of_torn(local, grid))
         elif (share := layers.fit[1]) > _SOME:
             warnings.append(
-                f"{share:.0%} of the points lie more than {_OFF:g} cells off the single layer, as where sheets run "
+                f"{share:.0%} of the points lie more than {OFF:g} cells off the single layer, as where sheets run "
                 "closer than the grid's cells and one of them is missing; raise the resolution, or use the double cover"
             )
         if unoriented:

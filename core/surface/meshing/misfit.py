@@ -3,12 +3,23 @@
 import numpy as np
 from scipy.spatial import KDTree
 
+from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, lengths
 from ..mesh import Mesh, at_corners
 
+_TORN = 0.07  # cells, mean distance of the samples to a mesh, above which it is torn
+_ASKEW = 0.1  # of its area, the same where faces are turned away from the samples
+OFF = 0.5  # cells off a mesh, where a sample is missed
 _FACES = 4  # that a sample may belong to
 _ASKED = 4096  # samples or faces, evenly picked out of more
 _TURNED = np.cos(np.pi / 4)
+
+
+def misfit(mesh: Mesh, surface: LocalSurface, cell: float) -> tuple[float, float]:
+    """How far the samples of the surface are off a mesh, or how much of it is turned away from them, whichever is
+    worse: 1 and more where the mesh is torn; and the share of the samples that it misses, by half a cell and more."""
+    off = distances(mesh, surface.points) / cell
+    return max(off.mean() / _TORN, askew(mesh, surface.tree, surface.normals) / _ASKEW), (off > OFF).mean()
 
 
 def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from ..double.double_cover import double_cover
 from ..edges.crossings import Crossings
 from ..mesh import Mesh
 from ..meshing.centring import centred
+from ..meshing.misfit import misfit
 from ..signed import signed_mesh
 from ..signs.sides import Sides, patch_lengths, patches
 from ..signs.two_sides import LONG, two_sided
@@ -28,6 +29,8 @@ from .orientation import orient
 from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
 
+_PARTED = 0.01  # of the samples, missed by what parts sheets side by side, at most
+BETTER = 0.5  # times the misfit of one mesh, below which another is taken
 _MENDED = 2  # times, since holes may show where scraps are gone
 _BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
 _BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
@@ -38,32 +41,55 @@ def single_layer(
 ) -> tuple[Mesh, int]:
     """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
     progress = Progress.of(progress)
-    sheet = sheet_of_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.5))
+    between = sheet_between_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.3))
+    sheet = sheet_of_sides(values, crossings, sides, surface, grid, between, progress.part(0.3, 0.5))
     if sheet is not None:
         return sheet, 0
     cover = partial(double_cover, values, band, surface, grid, Settings().offset)
-    return sheet_of_crossings(values, band, crossings, surface, grid, cover, progress.part(0.5, 1.0))
+    return sheet_of_crossings(values, band, crossings, surface, grid, between, cover, progress.part(0.5, 1.0))
 
 
-def sheet_of_sides(
+def sheet_between_sides(
     values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
 ) -> Mesh | None:
-    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface;
-    else what lies between the two sides (see :func:`open_sheet`). None where it is one-sided or sheets meet.
+    """What lies between the two sides of a surface that bounds no inside, see :func:`open_sheet`, with one face or two
+    at every edge and all wound alike. None where it has no such sides, and where sheets meet but do not run side by
+    side, which it may part.
 
     values : (nx,ny,nz) float32 or Blocks, unsigned distances     band : the nodes near the surface
     """
-    progress, passing = Progress.of(progress), crossings.meetings.passing
-    if sides.complete:
-        return signed_mesh(sides.sign(values), passing, surface, grid, progress)
-    if crossings.normal.any():
+    progress, meetings = Progress.of(progress), crossings.meetings
+    if sides.complete or (crossings.normal.any() and not meetings.side_by_side):
         return None
     signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.2))
     if signed is None:
         return None
-    found = open_sheet(signed, band, passing, surface, grid, progress.part(0.2, 0.8))
-    sheet, unoriented = _finished(found, passing, surface, grid, progress.part(0.8, 1.0))
-    return None if unoriented or (sheet.edge_counts()[1] > 2).any() else sheet
+    found = open_sheet(signed, band, meetings.passing, surface, grid, progress.part(0.2, 0.8))
+    sheet, unoriented = _finished(found, meetings.passing, surface, grid, progress.part(0.8, 1.0))
+    return None if unoriented or len(_lines(sheet)) else sheet
+
+
+def sheet_of_sides(
+    values,
+    crossings: Crossings,
+    sides: Sides,
+    surface: LocalSurface,
+    grid: Grid,
+    between: Mesh | None,
+    progress=None,
+) -> Mesh | None:
+    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface;
+    else what lies `between` its sides (see :func:`sheet_between_sides`), if it is not torn where sheets run side by
+    side. None where there is none, as on one-sided surfaces and mostly where sheets meet.
+
+    values : (nx,ny,nz) float32 or Blocks, unsigned distances
+    """
+    if sides.complete:
+        return signed_mesh(sides.sign(values), crossings.meetings.passing, surface, grid, progress)
+    if between is None or not crossings.normal.any():
+        return between
+    worst, missed = misfit(between, surface, grid.spacing)
+    return between if worst <= 1 and missed <= _PARTED else None
 
 
 def sheet_of_crossings(
@@ -72,6 +98,7 @@ def sheet_of_crossings(
     crossings: Crossings,
     surface: LocalSurface,
     grid: Grid,
+    between: Mesh | None,
     cover: Callable[[], Mesh],
     progress=None,
 ) -> tuple[Mesh, int]:
@@ -80,11 +107,12 @@ def sheet_of_crossings(
     Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
     either side, may have handles where samples are sparse, and tears where the line ends; so it is taken only if
     samples do not show the line, and the dual contour cannot be wound alike wherever it has two faces, and does not end
-    along the line, as where sheets meet. Where sheets run side by side this may be torn, too; then it is one side of
-    the `cover`, a function that gives the double cover (see :func:`one_side`). Creases may look like sheets that meet
-    for some cells; so what lies between two sides is taken in place of a dual contour all of whose lines are short,
-    too, if it is wound alike, and has no such lines and no borders in their place.
+    along the line, as where sheets meet. Creases may look like sheets that meet for some cells; so it is taken in place
+    of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines and no borders in
+    their place. Where sheets run side by side all may be torn; then see :func:`_of_torn`.
 
+    between : what lies between the two sides there, which may be torn
+    cover   : function that gives the double cover
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress, meetings = Progress.of(progress), crossings.meetings
@@ -102,12 +130,23 @@ def sheet_of_crossings(
     if signed is None:
         return sheet, unoriented
     if meetings.side_by_side:
-        return _finished(one_side(cover(), signed, surface, grid), passing, surface, grid, Progress())
+        one = _finished(one_side(cover(), signed, surface, grid), passing, surface, grid, Progress())
+        return _of_torn([one, (between, 0), (sheet, unoriented)], surface, grid)
     found = open_sheet(signed, band, passing, surface, grid, progress.part(0.6, 0.9))
     found, left = _finished(found, passing, surface, grid, progress.part(0.9, 1.0))
     parted = _borders_beside(lines, found, grid.spacing)
     replaces = not (left or parted or len(_lines(found))) if chance else parted <= _BORDERED * len(lines)
     return (found, left) if replaces else (sheet, unoriented)
+
+
+def _of_torn(sheets, surface, grid):
+    """The first of some sheets, each with the number of its edges that are not wound alike, unless another that there
+    is fits the samples far better: one side of a double cover shows one wall of thin parts, but is nowhere ragged."""
+    best, least = sheets[0], misfit(sheets[0][0], surface, grid.spacing)[0]
+    for sheet in sheets[1:]:
+        if sheet[0] is not None and (worst := misfit(sheet[0], surface, grid.spacing)[0]) < BETTER * least:
+            best, least = sheet, worst
+    return best
 
 
 def _lines(sheet):

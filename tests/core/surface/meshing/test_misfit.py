@@ -1,12 +1,14 @@
 """The distance of samples to a mesh, by closed form and against exact distances."""
 
+from types import SimpleNamespace
+
 import igl
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
 from core import Mesh
-from core.surface.meshing.misfit import askew, distances
+from core.surface.meshing.misfit import askew, distances, misfit
 
 SQUARE = Mesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
 
@@ -55,3 +57,15 @@ def test_how_much_is_turned_away_from_the_samples():
 def test_of_no_faces_all_is_turned_away():
     none = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
     assert askew(none, KDTree(np.zeros((1, 3))), np.array([[0, 0, 1.0]])) == 1
+
+
+@pytest.mark.parametrize(
+    ("height", "tilt", "worst", "missed"),
+    [(0, 0, 0, 0), (0.14, 0, 2, 0), (0.49, 0, 7, 0), (0.51, 0, 7.3, 1), (0, 50, 10, 0)],
+)
+def test_the_worse_of_distance_and_turn_tells_the_misfit(height, tilt, worst, missed):
+    """Heights in cells, here of 2; .07 of them, or a tenth of the area askew, is 1."""
+    points = np.random.default_rng(0).uniform([0.2, 0.2, 2 * height], [0.8, 0.8, 2 * height], (500, 3))
+    normal = [np.sin(np.radians(tilt)), 0, np.cos(np.radians(tilt))]
+    surface = SimpleNamespace(points=points, normals=np.tile(normal, (500, 1)), tree=KDTree(points))
+    assert misfit(SQUARE, surface, 2.0) == (pytest.approx(worst, abs=0.1), missed)

@@ -11,7 +11,7 @@ from core.linalg import symmetric
 from core.progress import Progress
 from core.surface import extract
 from core.surface.signs.two_sides import _orientations, two_sided
-from core.surface.single.single_layer import sheet_of_sides
+from core.surface.single.single_layer import sheet_between_sides
 from tests import shapes
 
 
@@ -27,9 +27,9 @@ def asked(monkeypatch):
             seen.update(zip(("values", "band", "crossings", "surface", "grid"), given, strict=True))
             signed = two_sided(*given, Progress())
             seen["signed"] = signed.dense() if isinstance(signed, Blocks) else signed
-            return sheet_of_sides(values, band, crossings, sides, *rest)
+            return sheet_between_sides(values, band, crossings, sides, *rest)
 
-        monkeypatch.setattr(extract, "sheet_of_sides", look)
+        monkeypatch.setattr(extract, "sheet_between_sides", look)
         reconstruct(points, Settings(**{"resolution": 48, "surface": "single", "denoise": 0, **settings}))
         return seen
 
