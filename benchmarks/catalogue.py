@@ -62,6 +62,7 @@ CASES = {
     "petals_10k": Recipe("open", bordered.petals, 10_000),
     "spiral_5k": Recipe("open", bordered.spiral, 5_000),
     "relief_20k": Recipe("open", bordered.relief, 20_000),
+    "curtain_20k": Recipe("open", bordered.curtain, 20_000),
     "paperplane_1k": Recipe("non-manifold", junctions.paper_plane, 1_000),
     "strawberry_1k": Recipe("non-manifold", junctions.strawberry, 1_000),
     "fish_3k": Recipe("non-manifold", junctions.fish, 3_000),

@@ -70,3 +70,20 @@ def spiral() -> Surface:
         return np.stack([out * np.cos(turn), out * np.sin(turn), 0.1 * turn], axis=1)
 
     return from_patches([Patch(position, (120, 700))])
+
+
+def curtain() -> Surface:
+    """A curtain drawn aside: twelve layers folded to and fro, 1/57 of its height apart, the folds half circles."""
+    layers, depth, apart = 12, 0.0625, 0.0175
+    fold = 0.5 * np.pi * apart
+
+    def position(uv):
+        way = uv[:, 0] * (layers * (depth + fold) - fold)
+        layer = np.clip(way // (depth + fold), 0, layers - 1)
+        at = way - layer * (depth + fold)
+        turn = np.maximum(at - depth, 0) / (0.5 * apart)
+        out = np.minimum(at, depth) + 0.5 * apart * np.sin(turn)
+        along = layer * apart + 0.5 * apart * (1 - np.cos(turn))
+        return np.stack([np.where(layer % 2 == 0, out, depth - out), along, uv[:, 1]], axis=1)
+
+    return from_patches([Patch(position, (1000, 120))])

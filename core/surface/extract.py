@@ -26,7 +26,8 @@ from .single.single_layer import BETTER, sheet_between_sides, sheet_of_crossings
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
-_SOME = 0.02  # share of the samples that a single layer misses, above which it is said
+_ROUGH = 0.12  # the same where sheets run side by side
+_SOME = 0.02  # share of the samples that a mesh misses, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
@@ -124,20 +125,32 @@ class _Layers:
     def is_cover_better(self) -> bool:
         """Whether the single layer is torn, and the double cover is not."""
         worst = self.fit[0]
-        return worst > 1 and self._fit(self.cover)[0] < BETTER * worst
+        return worst > 1 and self.cover_fit[0] < BETTER * worst
 
     @cached_property
     def cover(self) -> Mesh:
-        """The double cover: both sides of the single layer, where these are the whole surface, or where the one
-        extracted is torn, as on grids so coarse that it merges sheets, and they are not."""
-        whole = self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1
-        return self._both_sides() if whole or self._is_sheet_better() else self.extracted
+        """The double cover."""
+        return self._both_sides() if self.is_of_sheet else self.extracted
+
+    @property
+    def cover_fit(self) -> tuple[float, float]:
+        """:func:`misfit` of the double cover."""
+        return self.fit if self.is_of_sheet else self.extracted_fit
+
+    @cached_property
+    def is_of_sheet(self) -> bool:
+        """Whether the double cover is both sides of the single layer: where these are the whole surface, or where the
+        one extracted is torn, as on grids so coarse that it merges sheets, and they are not."""
+        return (self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1) or self._is_sheet_better()
 
     def _is_sheet_better(self):
-        """Whether the extracted double cover is torn, and the single layer is not."""
+        """Whether the extracted double cover is torn, and the single layer is not; or where sheets run side by side,
+        whether it is rough and a single layer that parts them is less so."""
         if self.local.spacing_in_cells(self.grid) > _SPARSEST:
             return False
-        worst = self._fit(self.extracted)[0]
+        worst = self.extracted_fit[0]
+        if self.meetings.side_by_side and worst > _ROUGH and self.sheet is not None:
+            return self._fit(self.sheet)[0] < worst
         return worst > _MERGED and self._fit(self.single[0])[0] < BETTER * worst
 
     def _both_sides(self):
@@ -151,6 +164,10 @@ class _Layers:
         """The double cover extracted at an offset."""
         part = self.progress.part(0.7, 1.0, "double cover")
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
+
+    @cached_property
+    def extracted_fit(self) -> tuple[float, float]:
+        return self._fit(self.extracted)
 
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one with handles, unless their
@@ -166,9 +183,7 @@ class _Layers:
                 return bool(self.meetings.passing.any())
             if self.local.confidence[self.meetings.through].mean() < _CLEAN:
                 return False
-        if not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid):
-            return True
-        return self.sheet is not None
+        return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
     def _is_whole(self):
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
@@ -206,6 +221,13 @@ def _said_of_torn(local, grid):
     )
 
 
+def _said_of_missed(missed, mesh, how):
+    return (
+        f"{missed:.0%} of the points lie more than {OFF:g} cells off the {mesh}, as where sheets run closer than the "
+        f"grid's cells and {how}; raise the resolution"
+    )
+
+
 def extract_surfaces(
     values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
 ) -> Surfaces:
@@ -229,16 +251,16 @@ def extract_surfaces(
     layers = _Layers(values, band, local, grid, settings.offset, progress)
     if kind in ("double", "both"):
         meshes["double"] = layers.cover
+        if (missed := layers.cover_fit[1]) > _SOME:
+            warnings.append(_said_of_missed(missed, "double cover", "they are merged"))
     if kind in ("single", "both"):
         meshes["single"], unoriented = layers.single
         if layers.is_cover_better:
             meshes["single"], unoriented = layers.cover, 0
             warnings.append(_said_of_torn(local, grid))
-        elif (share := layers.fit[1]) > _SOME:
-            warnings.append(
-                f"{share:.0%} of the points lie more than {OFF:g} cells off the single layer, as where sheets run "
-                "closer than the grid's cells and one of them is missing; raise the resolution, or use the double cover"
-            )
+        elif (missed := layers.fit[1]) > _SOME:
+            other = "" if kind == "both" else ", or use the double cover"
+            warnings.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
         if unoriented:
             warnings.append(
                 f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from benchmarks.geometry import closest_faces, face_normals
 from benchmarks.metrics import topology
 from benchmarks.sampling import blue_noise, graded, pierced, uniform, wires
-from benchmarks.shapes import junctions, one_sided
+from benchmarks.shapes import bordered, junctions, one_sided
 from benchmarks.shapes.panels import box
 from benchmarks.shapes.surface import Patch, from_implicit, from_mesh, from_patches, sample, with_crossings
 
@@ -32,6 +32,7 @@ def off_torus(points):
 @pytest.mark.parametrize(
     ("make", "euler", "loops", "at_junctions"),
     [
+        (bordered.curtain, 1, 1, 0),
         (one_sided.moebius, 0, 1, 0),
         (junctions.t_junction, 1, 1, 1),
         (junctions.paper_plane, 1, 1, 1),
