@@ -81,8 +81,9 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
 
     A callback hears of the progress in the caller's thread while the work is done in another: at every report, and
     the last one again where the work is silent for long. So a cancel is heeded at once, even while a library sorts
-    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. With a
-    `Progress` or nothing to report to, all is done in the caller's thread.
+    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. Where a
+    stage is done once another one is seen to have failed, the fraction waits. With a `Progress` or nothing to report
+    to, all is done in the caller's thread.
     """
     if progress is None or isinstance(progress, Progress):
         return work(Progress.of(progress))
@@ -98,7 +99,7 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
         except BaseException as error:  # noqa: BLE001  raised again in the caller's thread
             reports.put(_Outcome(None, error))
 
-    thread, last = Thread(target=run, daemon=True), None
+    thread, last, farthest = Thread(target=run, daemon=True), None, 0.0
     thread.start()
     try:
         while True:
@@ -107,7 +108,8 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
             if isinstance(last, _Outcome):
                 break
             if last is not None:
-                Progress(progress, text=last[1])(last[0])
+                farthest = max(farthest, last[0])
+                Progress(progress, text=last[1])(farthest)
     finally:
         cancelled.set()
         thread.join(_FAREWELL)

@@ -120,6 +120,17 @@ class TestWatched:
         awake.set()
         assert looked.wait(10)
 
+    def test_is_never_heard_to_go_back(self):
+        seen = []
+
+        def work(progress):
+            for fraction in (0.4, 0.7, 0.2, 0.8):
+                progress(fraction)
+
+        watched(work, lambda fraction, _: seen.append(fraction))
+        assert seen == sorted(seen)
+        assert {0.4, 0.7, 0.8} == set(seen)
+
     def test_what_either_raises_comes_through(self):
         def broken(*_):
             raise RuntimeError("broken")
