@@ -149,7 +149,7 @@ class _Layers:
         if self.local.spacing_in_cells(self.grid) > _SPARSEST:
             return False
         worst = self.extracted_fit[0]
-        if self.meetings.side_by_side and worst > _ROUGH and self.sheet is not None:
+        if worst > _ROUGH and self.meetings.side_by_side and self.sheet is not None:
             return self._fit(self.sheet)[0] < worst
         return worst > _MERGED and self._fit(self.single[0])[0] < BETTER * worst
 
