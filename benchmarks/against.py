@@ -112,7 +112,7 @@ bench running: medians. *load*: processes at work on the machine in the minute b
 
 {said}
 
-{_markdown(lines)}
+{markdown_rows(lines)}
 """
 
 
@@ -135,7 +135,7 @@ def overview(results: list[dict]) -> str:
         lowest = min(measures["cd"] for measures in found.values() if "cd" in measures)
         cells = [_cd(found.get(name, {}), lowest) for name in titles]
         lines.append([result["case"], *cells, f"{_ratio(result, _DEFAULT):.2f}"])
-    return _markdown(lines)
+    return markdown_rows(lines)
 
 
 def _cd(measures, lowest):
@@ -156,7 +156,7 @@ def full_table(results: list[dict]) -> str:
             variant = ABSENT if found["variant"] is None else str(found["variant"]).strip("()[]")
             numbers = [form.format(found[key]) for key, form in _COLUMNS.items()]
             lines.append([result["case"], titles[name], variant, *numbers])
-    return _markdown(lines)
+    return markdown_rows(lines)
 
 
 def ways() -> str:
@@ -176,7 +176,3 @@ def _titles(results):
     run = {name for result in compared(results) for name in result["peers"]}
     finer = FINE if any(name in result for name in FINE for result in compared(results)) else {}
     return OURS | finer | {name: peer.title for name, peer in PEERS.items() if name in run}
-
-
-def _markdown(lines):
-    return markdown_rows(lines)

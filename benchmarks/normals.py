@@ -265,7 +265,7 @@ def _ablation_table(rows):
         for name in ("printed", "default"):
             found = [f"{nc:.4f}" for nc in row[name]]
             lines.append([f"{row['points']:,}", name, *found, f"{row['sweeps']:.4f}"])
-    return _markdown(lines)
+    return markdown_rows(lines)
 
 
 def _steps(curves):
@@ -276,7 +276,7 @@ def _steps(curves):
     for name, curve in curves.items():
         least, turn = f"{min(curve['energy']):.4f}", f"{curve['turns'][-1]:.3f}°"
         lines.append([name, f"{curve['points']:,}", least, turn, str(curve["sweeps"])])
-    return _markdown(lines)
+    return markdown_rows(lines)
 
 
 def _cost_table(runs):
@@ -286,10 +286,6 @@ def _cost_table(runs):
         cpu, clock = run["stage_cpu"] / run["delaunay_cpu"], run["stage_seconds"] / run["delaunay_seconds"]
         share, peak = run["facets_cpu"] / run["stage_cpu"], run["peak_memory_mb"]
         lines.append([f"{run['points']:,}", f"{cpu:.2f}", f"{clock:.2f}", f"{share:.0%}", f"{peak:,.0f} MiB"])
-    return _markdown(lines)
-
-
-def _markdown(lines):
     return markdown_rows(lines)
 
 

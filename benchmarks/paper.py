@@ -151,7 +151,7 @@ def _table(published, results, best, measure):
                     rows += 1
         if not rows:
             lines.append([shape, *printed, *[ABSENT] * 3])
-    return _markdown(lines)
+    return markdown_rows(lines)
 
 
 def _categories(uniform):
@@ -166,7 +166,7 @@ def _categories(uniform):
         names = "; ".join(named) or ABSENT
         published = [f"{vad[0]:.3f}", f"{other[0]:.3f}", cd, f"{vad[1]:.1f}", f"{other[1]:.1f}", hd]
         lines.append([category, *published, f"{vad[2]:.4f}", near, f"{vad[3]:.4f}", far, names])
-    return _markdown(lines)
+    return markdown_rows(lines)
 
 
 _FORMS = {"cd": "{:.3f}", "hd": "{:.1f}", "f005": "{:.4f}", "f010": "{:.4f}"}
@@ -190,10 +190,6 @@ def _nc(result):
 
 def _errors(result):
     return f"{result['mesh']['cd']:.3f} / {result['mesh']['hd']:.1f}"
-
-
-def _markdown(lines):
-    return markdown_rows(lines)
 
 
 if __name__ == "__main__":

@@ -114,12 +114,14 @@ class _Layers:
         return sheet_of_crossings(*given, lambda: self.extracted, part)
 
     @cached_property
-    def fit(self) -> tuple[float, float]:
-        """:func:`misfit` of the single layer; 0 where it bounds the inside."""
-        return (0.0, 0.0) if self.sides.complete else self._fit(self.single[0])
+    def single_fit(self) -> tuple[float, float]:
+        """:func:`misfit` of the single layer."""
+        return misfit(self.single[0], self.local, self.grid.spacing)
 
-    def _fit(self, mesh):
-        return misfit(mesh, self.local, self.grid.spacing)
+    @property
+    def fit(self) -> tuple[float, float]:
+        """The same, but 0 where it bounds the inside."""
+        return (0.0, 0.0) if self.sides.complete else self.single_fit
 
     @property
     def is_cover_better(self) -> bool:
@@ -150,8 +152,8 @@ class _Layers:
             return False
         worst = self.extracted_fit[0]
         if worst > _ROUGH and self.meetings.side_by_side and self.sheet is not None:
-            return self._fit(self.sheet)[0] < worst
-        return worst > _MERGED and self._fit(self.single[0])[0] < BETTER * worst
+            return self.single_fit[0] < worst
+        return worst > _MERGED and self.single_fit[0] < BETTER * worst
 
     def _both_sides(self):
         """Those of the single layer, without the pockets of a few faces that may be left along the lines where sheets
@@ -167,7 +169,8 @@ class _Layers:
 
     @cached_property
     def extracted_fit(self) -> tuple[float, float]:
-        return self._fit(self.extracted)
+        """:func:`misfit` of that."""
+        return misfit(self.extracted, self.local, self.grid.spacing)
 
     def _may_be_sheet(self):
         """Whether to look for a single layer. Sheets that pass through each other have one with handles, unless their
