@@ -18,15 +18,21 @@ from .edges.crossings import Crossings, find_crossings
 from .edges.meetings import Meetings, find_meetings
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
-from .meshing.misfit import OFF, misfit
+from .meshing.misfit import OFF, chamfer, misfit
 from .meshing.pieces import pieces_touch, pieces_with_samples, without_small_pieces
-from .signed import signed_distance, signed_mesh
+from .signed import signed_distance
 from .signs.sides import Sides, find_sides, may_be_closed, needed_band
-from .single.single_layer import BETTER, sheet_between_sides, sheet_of_crossings, sheet_of_sides
+from .single.single_layer import (
+    BETTER,
+    ROUGH,
+    boundary_of_inside,
+    sheet_between_sides,
+    sheet_of_crossings,
+    sheet_of_sides,
+)
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
-_ROUGH = 0.12  # the same where sheets run side by side
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said
 _SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
@@ -102,7 +108,8 @@ class _Layers:
     def sheet(self) -> Mesh | None:
         """The single layer of a surface with two sides."""
         part = self.progress.part(0.3, 0.5, "single layer")
-        return sheet_of_sides(self.values, self.crossings, self.sides, self.local, self.grid, self.between, part)
+        given = self.values, self.crossings, self.sides, self.local, self.grid, self.between
+        return sheet_of_sides(*given, lambda: self.extracted, part)
 
     @cached_property
     def single(self) -> tuple[Mesh, int]:
@@ -120,8 +127,9 @@ class _Layers:
 
     @property
     def fit(self) -> tuple[float, float]:
-        """The same, but 0 where it bounds the inside."""
-        return (0.0, 0.0) if self.sides.complete else self.single_fit
+        """The same, but 0 where it bounds the inside and no sheets run side by side, as in thin walls."""
+        plain = self.sides.complete and not self.meetings.side_by_side
+        return (0.0, 0.0) if plain else self.single_fit
 
     @property
     def is_cover_better(self) -> bool:
@@ -132,30 +140,39 @@ class _Layers:
     @cached_property
     def cover(self) -> Mesh:
         """The double cover."""
-        return self._both_sides() if self.is_of_sheet else self.extracted
+        return self.both_sides if self.is_of_sheet else self.extracted
 
-    @property
+    @cached_property
     def cover_fit(self) -> tuple[float, float]:
         """:func:`misfit` of the double cover."""
-        return self.fit if self.is_of_sheet else self.extracted_fit
+        if not self.is_of_sheet:
+            return self.extracted_fit
+        return misfit(self.cover, self.local, self.grid.spacing) if self.meetings.side_by_side else self.fit
 
     @cached_property
     def is_of_sheet(self) -> bool:
-        """Whether the double cover is both sides of the single layer: where these are the whole surface, or where the
-        one extracted is torn, as on grids so coarse that it merges sheets, and they are not."""
-        return (self._may_be_sheet() and self._is_whole() and self.fit[0] <= 1) or self._is_sheet_better()
+        """Whether the double cover is both sides of the single layer: where these are the whole surface, and in doubt
+        where they are closer to it than the cover extracted."""
+        looked = self._may_be_sheet()
+        if looked and not self.meetings.side_by_side and self._is_whole() and self.fit[0] <= 1:
+            return True
+        return (looked or self._is_rough()) and self._is_closer()
 
-    def _is_sheet_better(self):
-        """Whether the extracted double cover is torn, and the single layer is not; or where sheets run side by side,
-        whether it is rough and a single layer that parts them is less so."""
+    def _is_rough(self):
+        """Whether the extracted double cover is torn, or where sheets run side by side and the surface has two sides,
+        whether it is rough, so that it may merge what the single layer parts."""
         if self.local.spacing_in_cells(self.grid) > _SPARSEST:
             return False
         worst = self.extracted_fit[0]
-        if worst > _ROUGH and self.meetings.side_by_side and self.sheet is not None:
-            return self.single_fit[0] < worst
-        return worst > _MERGED and self.single_fit[0] < BETTER * worst
+        return worst > _MERGED or (worst > ROUGH and self.meetings.side_by_side and self.sheet is not None)
 
-    def _both_sides(self):
+    def _is_closer(self):
+        """Whether both sides of the single layer are closer to the surface than the extracted double cover."""
+        both, cover = (chamfer(mesh, self.local, self.grid.spacing) for mesh in (self.both_sides, self.extracted))
+        return both < cover
+
+    @cached_property
+    def both_sides(self) -> Mesh:
         """Those of the single layer, without the pockets of a few faces that may be left along the lines where sheets
         meet."""
         cover = both_sides(self.single[0], self.grid.spacing)
@@ -189,17 +206,17 @@ class _Layers:
         return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
     def _is_whole(self):
-        """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
-        surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
-        by side, or if it has none and its borders are elsewhere. Where sheets pass through each other it has lines."""
+        """Whether the single layer shows all of the surface where no sheets run side by side. It does where there are
+        two sides, and may on a one-sided surface unless it falls apart, and where sheets meet if its lines are where
+        samples show that, or if it has none and its borders are elsewhere. Where sheets pass through each other it has
+        lines."""
         if self.sheet is not None:
             return self.sides.complete or not self.meetings.pass_through
         sheet = self.single[0]
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
-            shown = self.meetings.passing.any() or self._at_meetings(sheet.vertices[line]) >= _SEEN
-            return shown and not self.meetings.side_by_side
+            return bool(self.meetings.passing.any()) or self._at_meetings(sheet.vertices[line]) >= _SEEN
         if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
             return False
         return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT
@@ -240,8 +257,8 @@ def extract_surfaces(
     The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
     other and it does not show where, or sheets run side by side, or meet where samples do not show it, or samples are
     sparse, or so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets
-    run close; then it is extracted at an offset, see :mod:`.double.double_cover`, if that does not merge sheets that
-    the single layer parts.
+    run close; then it is extracted at an offset, see :mod:`.double.double_cover`, if that is not rough, or is closer to
+    the surface.
 
     place : function that takes positions (m,3) to the user's units, for messages
     Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,
@@ -272,7 +289,7 @@ def extract_surfaces(
     if kind == "signed":
         values = signed_distance(values, layers.sides, local, place)
         part = progress.part(0.6, 1.0, "signed surface")
-        meshes["signed"] = signed_mesh(values, layers.meetings.passing, local, grid, part)
+        meshes["signed"] = boundary_of_inside(values, layers.meetings, local, grid, lambda: layers.extracted, part)
         if not layers.sides.complete:
             warnings.append(
                 f"{layers.sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "

@@ -13,9 +13,10 @@ from ...progress import Progress
 from ...settings import Settings
 from ..double.double_cover import double_cover
 from ..edges.crossings import Crossings
+from ..edges.meetings import Meetings
 from ..mesh import Mesh
 from ..meshing.centring import centred
-from ..meshing.misfit import misfit
+from ..meshing.misfit import chamfer, misfit
 from ..signed import signed_mesh
 from ..signs.sides import Sides, patch_lengths, patches
 from ..signs.two_sides import LONG, two_sided
@@ -30,6 +31,7 @@ from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
 
 _PARTED = 0.01  # of the samples, missed by what parts sheets side by side, at most
+ROUGH = 0.12  # misfit of a mesh where sheets run side by side, beyond which another is looked at
 BETTER = 0.5  # times the misfit of one mesh, below which another is taken
 _MENDED = 2  # times, since holes may show where scraps are gone
 _BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
@@ -42,10 +44,10 @@ def single_layer(
     """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
     progress = Progress.of(progress)
     between = sheet_between_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.3))
-    sheet = sheet_of_sides(values, crossings, sides, surface, grid, between, progress.part(0.3, 0.5))
+    cover = partial(double_cover, values, band, surface, grid, Settings().offset)
+    sheet = sheet_of_sides(values, crossings, sides, surface, grid, between, cover, progress.part(0.3, 0.5))
     if sheet is not None:
         return sheet, 0
-    cover = partial(double_cover, values, band, surface, grid, Settings().offset)
     return sheet_of_crossings(values, band, crossings, surface, grid, between, cover, progress.part(0.5, 1.0))
 
 
@@ -76,20 +78,41 @@ def sheet_of_sides(
     surface: LocalSurface,
     grid: Grid,
     between: Mesh | None,
+    cover: Callable[[], Mesh],
     progress=None,
 ) -> Mesh | None:
-    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface;
-    else what lies `between` its sides (see :func:`sheet_between_sides`), if it is not torn where sheets run side by
-    side. None where there is none, as on one-sided surfaces and mostly where sheets meet.
+    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface
+    (see :func:`boundary_of_inside`); else what lies `between` its sides (see :func:`sheet_between_sides`), if it is not
+    torn where sheets run side by side. None where there is none, as on one-sided surfaces and mostly where sheets meet.
 
-    values : (nx,ny,nz) float32 or Blocks, unsigned distances
+    values : (nx,ny,nz) float32 or Blocks, unsigned distances     cover : function that gives the double cover
     """
     if sides.complete:
-        return signed_mesh(sides.sign(values), crossings.meetings.passing, surface, grid, progress)
+        return boundary_of_inside(sides.sign(values), crossings.meetings, surface, grid, cover, progress)
     if between is None or not crossings.normal.any():
         return between
     worst, missed = misfit(between, surface, grid.spacing)
     return between if worst <= 1 and missed <= _PARTED else None
+
+
+def boundary_of_inside(
+    signed, meetings: Meetings, surface: LocalSurface, grid: Grid, cover: Callable[[], Mesh], progress=None
+) -> Mesh:
+    """The boundary of the inside of a closed surface, see :func:`signed_mesh`: closed and wound outwards.
+
+    It has holes in walls so thin that hardly a node lies inside. A double cover extracted at an offset does not: around
+    a thin wall it has one layer in place of two. So where sheets run side by side its outer side is taken if that is
+    closed, too, and closer to the surface, as it is where all walls are thin; thick ones beside thin slits it misses.
+
+    signed : (nx,ny,nz) float32 or Blocks, distances, negative inside     cover : function that gives the double cover
+    """
+    mesh = signed_mesh(signed, meetings.passing, surface, grid, progress)
+    if not meetings.side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
+        return mesh
+    outer = mended(one_side(cover(), signed, surface, grid), surface, grid.spacing)
+    closed = (outer.edge_counts()[1] == 2).all()
+    closer = closed and chamfer(outer, surface, grid.spacing) < chamfer(mesh, surface, grid.spacing)
+    return outer if closer else mesh
 
 
 def sheet_of_crossings(

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import igl
 import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
@@ -338,10 +339,47 @@ def test_walls_on_a_ground_that_ends_there_have_the_cover_of_one_sheet():
 
 
 def test_a_run_leaves_a_torn_sheet_alone(monkeypatch):
-    """As if samples were far off it."""
+    """As if samples were far off it, and the cover extracted were closer to them."""
     assert is_of_sheet(reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both")))
     monkeypatch.setattr(misfit, "_TORN", 1e-9)
-    assert not is_of_sheet(reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both")))
+    for both, cover in ((1, 2), (2, 1)):
+        monkeypatch.setattr(extract, "chamfer", lambda *_, told=iter([both, cover]): next(told))
+        run = reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both"))
+        assert is_of_sheet(run) == (both < cover)
+
+
+@pytest.mark.parametrize("pages", [[0, 25, 50, 180], [0, 10, 180, 190]])
+def test_in_doubt_the_cover_that_is_closer_to_the_surface_is_taken(monkeypatch, pages):
+    """Sheets that run side by side to where they meet; by exact distances, both ways."""
+    turn = shapes.random_rotation(1)
+    corner = np.array([[0, -1, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0.0]])
+    quads = [corner @ rotation_about_y(page).T for page in pages]
+    faces = (np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(pages))[:, None, None]).reshape(-1, 3)
+    truth = Mesh(np.concatenate(quads) @ turn.T, faces.astype(np.int32))
+    points = on_faces(truth, 1200 * len(pages))
+    off = []
+    for sign in (1, -1):
+        monkeypatch.setattr(extract, "chamfer", lambda *given, sign=sign: sign * misfit.chamfer(*given))
+        cover = reconstruct(points, Settings(resolution=40)).surface
+        off.append(exact_distances(on_faces(cover, 4000), truth).mean() + exact_distances(points, cover).mean())
+    assert off[0] < 0.8 * off[1]
+
+
+def rotation_about_y(degrees):
+    a = np.radians(degrees)
+    return np.array([[np.cos(a), 0, -np.sin(a)], [0, 1, 0], [np.sin(a), 0, np.cos(a)]])
+
+
+def on_faces(mesh, count):
+    """Random points on a mesh, uniform by area."""
+    rng, area = np.random.default_rng(0), mesh.face_areas()
+    corners = mesh.vertices[mesh.faces[rng.choice(len(area), count, p=area / area.sum())]]
+    u, v = np.sort(rng.random((2, count)), axis=0)[:, :, None]
+    return (1 - v) * corners[:, 0] + (v - u) * corners[:, 1] + u * corners[:, 2]
+
+
+def exact_distances(points, mesh):
+    return np.sqrt(igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)[0])
 
 
 def roll(count):

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Mesh
-from core.surface.meshing.misfit import askew, distances, misfit
+from core.surface.meshing.misfit import askew, chamfer, distances, misfit
 
 SQUARE = Mesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
 
@@ -69,3 +69,23 @@ def test_the_worse_of_distance_and_turn_tells_the_misfit(height, tilt, worst, mi
     normal = [np.sin(np.radians(tilt)), 0, np.cos(np.radians(tilt))]
     surface = SimpleNamespace(points=points, normals=np.tile(normal, (500, 1)), tree=KDTree(points))
     assert misfit(SQUARE, surface, 2.0) == (pytest.approx(worst, abs=0.1), missed)
+
+
+def test_the_chamfer_distance_counts_what_is_too_much_and_what_is_missing():
+    """Half the samples lie .4 above the mesh, and half of the second mesh 3 above the surface; in cells of 2."""
+    square = np.random.default_rng(0).uniform([0, 0, 0], [1, 1, 0], (500, 3))
+    up, faces = np.array([0, 0, 1.0]), np.concatenate([SQUARE.faces, SQUARE.faces + 4])
+    surface = SimpleNamespace(points=np.concatenate([square, square + 0.4 * up]), project=onto_the_ground)
+    two = Mesh(np.concatenate([SQUARE.vertices, SQUARE.vertices + 3 * up]), faces)
+    assert chamfer(SQUARE, surface, 2.0) == pytest.approx(0.1)
+    assert chamfer(two, surface, 2.0) == pytest.approx(0.1 + 0.75)
+
+
+def onto_the_ground(x):
+    """Onto the plane z = 0."""
+    return SimpleNamespace(distance=np.abs(x[:, 2]))
+
+
+def test_no_faces_are_infinitely_far():
+    surface = SimpleNamespace(points=np.zeros((1, 3)), project=onto_the_ground)
+    assert chamfer(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), surface, 1.0) == np.inf
