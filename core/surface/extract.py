@@ -151,10 +151,11 @@ class _Layers:
 
     @cached_property
     def is_of_sheet(self) -> bool:
-        """Whether the double cover is both sides of the single layer: where these are the whole surface, and in doubt
-        where they are closer to it than the cover extracted."""
+        """Whether the double cover is both sides of the single layer: where these are the whole surface and not torn,
+        nor even rough where sheets run side by side, and in doubt where they are closer to it than the cover extracted.
+        """
         looked = self._may_be_sheet()
-        if looked and not self.meetings.side_by_side and self._is_whole() and self.fit[0] <= 1:
+        if looked and self._is_whole() and self.fit[0] <= (ROUGH if self.meetings.side_by_side else 1):
             return True
         return (looked or self._is_rough()) and self._is_closer()
 
@@ -206,17 +207,17 @@ class _Layers:
         return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
 
     def _is_whole(self):
-        """Whether the single layer shows all of the surface where no sheets run side by side. It does where there are
-        two sides, and may on a one-sided surface unless it falls apart, and where sheets meet if its lines are where
-        samples show that, or if it has none and its borders are elsewhere. Where sheets pass through each other it has
-        lines."""
+        """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
+        surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
+        by side, or if it has none and its borders are elsewhere. Where sheets pass through each other it has lines."""
         if self.sheet is not None:
             return self.sides.complete or not self.meetings.pass_through
         sheet = self.single[0]
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
-            return bool(self.meetings.passing.any()) or self._at_meetings(sheet.vertices[line]) >= _SEEN
+            shown = self.meetings.passing.any() or self._at_meetings(sheet.vertices[line]) >= _SEEN
+            return shown and not self.meetings.side_by_side
         if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
             return False
         return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT

@@ -1,4 +1,4 @@
-"""How far a mesh is from the samples and these from it, and how much of it is turned away from them."""
+"""How far a mesh is from the samples and from the surface, and how much of it is turned away from them."""
 
 import numpy as np
 from scipy.spatial import KDTree
