@@ -9,6 +9,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
 
 from core import Mesh, Settings, both_sides, reconstruct
 from core.surface import extract
@@ -353,7 +354,7 @@ def test_in_doubt_the_cover_that_is_closer_to_the_surface_is_taken(monkeypatch, 
     """Sheets that run side by side to where they meet; by exact distances, both ways."""
     turn = shapes.random_rotation(1)
     corner = np.array([[0, -1, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0.0]])
-    quads = [corner @ rotation_about_y(page).T for page in pages]
+    quads = [Rotation.from_euler("y", page, degrees=True).apply(corner) for page in pages]
     faces = (np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(pages))[:, None, None]).reshape(-1, 3)
     truth = Mesh(np.concatenate(quads) @ turn.T, faces.astype(np.int32))
     points = on_faces(truth, 1200 * len(pages))
@@ -363,11 +364,6 @@ def test_in_doubt_the_cover_that_is_closer_to_the_surface_is_taken(monkeypatch, 
         cover = reconstruct(points, Settings(resolution=40)).surface
         off.append(exact_distances(on_faces(cover, 4000), truth).mean() + exact_distances(points, cover).mean())
     assert off[0] < 0.8 * off[1]
-
-
-def rotation_about_y(degrees):
-    a = np.radians(degrees)
-    return np.array([[np.cos(a), 0, -np.sin(a)], [0, 1, 0], [np.sin(a), 0, np.cos(a)]])
 
 
 def on_faces(mesh, count):
