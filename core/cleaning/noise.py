@@ -9,6 +9,7 @@ from ..progress import Progress
 from ..voronoi.facets import voronoi_facets
 from .anchors import SMOOTHING, nearest_anchor, some_samples
 from .roughness import least_part, roughness
+from .thin_walls import shows_thin_walls
 
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
 
@@ -37,26 +38,38 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     A cloud is noisy as a whole where nearly all of it looks so; noise of hundredths of a local spacing, as of rounded
     coordinates, counts where it grows no more up to 32 neighbours, either. Otherwise its noisy parts are those that
     look so throughout, or around a core that is well above all limits and not small: creases and thin sheets look noisy
-    in places.
+    in places. Nothing is noisy where two sheets show that are hardly farther apart than the noise would be, see
+    :mod:`.thin_walls`.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
         return clean
     progress = Progress.of(progress)
     found = roughness(points, spacing, seed, progress)
-    relative, anchors, region = found.relative, found.anchors, found.region
-    if found.whole:
-        agreement = _typical_agreement(points, spacing, seed, progress.part(0.1, 0.3))
-        turned = agreement < 1 - _TURNED * np.median(relative) ** 2
-        if (found.loud and agreement < _AGREED) or (found.slight and turned):
-            return ~clean
-    suspect = found.even
-    if found.suspect.sum() >= least_part(anchors):
-        suspect = suspect | _around_loud_cores(found, _agreement(points, spacing, progress.part(0.3, 0.9)))
-    if not suspect.any():
+    for suspect in _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.7)):
+        level = np.median(found.relative[suspect]) if suspect.any() else 0.0
+        if level and not shows_thin_walls(points, spacing, found.anchors[suspect], level, progress.part(0.7, 0.9)):
+            break
+    else:
         return clean
-    noisy = suspect[region[:, :SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
-    return noisy[nearest_anchor(points, points[anchors], progress.part(0.9, 1.0))]
+    if suspect.all():
+        return ~clean
+    noisy = suspect[found.region[:, :SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
+    return noisy[nearest_anchor(points, points[found.anchors], progress.part(0.9, 1.0))]
+
+
+def _noisy_anchors(points, spacing, found, seed, progress):
+    """Which anchors are noisy by how rough they are found and how far normals agree, (m,) bool: all, where the cloud is
+    as a whole, and those of its parts."""
+    if found.whole:
+        agreement = _typical_agreement(points, spacing, seed, progress.part(0.0, 0.3))
+        turned = agreement < 1 - _TURNED * np.median(found.relative) ** 2
+        if (found.loud and agreement < _AGREED) or (found.slight and turned):
+            yield np.ones(len(found.anchors), bool)
+    parts = found.even
+    if found.suspect.sum() >= least_part(found.anchors):
+        parts = parts | _around_loud_cores(found, _agreement(points, spacing, progress.part(0.3, 1.0)))
+    yield parts
 
 
 def _around_loud_cores(found, confidence):

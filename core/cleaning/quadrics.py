@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import COMPONENTS, dots, principal_axes, row_dots, solve_positive, tangent_frames
-from ..parallel import even_chunks, work_through
+from ..parallel import even_chunks, in_order
 from ..progress import Progress
 from .clusters import Clusters
 
@@ -53,6 +53,20 @@ class Quadrics:
         return self.height / (1.0 - self.leverage)
 
 
+@dataclass(frozen=True)
+class Residuals:
+    """How the neighbours of samples stand off the quadric through them, those near the sample counting for more.
+
+    kurtosis : (m,) float64, 1 where all are as far off it, on two sheets, 3 for Gaussian noise; nan where none is off
+    level    : (m,) float64, how far they are, root mean square
+    normal   : (m,3) float64, unit normal of their plane
+    """
+
+    kurtosis: np.ndarray
+    level: np.ndarray
+    normal: np.ndarray
+
+
 def fit_quadrics(points, rows, neighbours: int, progress=None, clusters: Clusters | None = None) -> Quadrics:
     """Quadric height fields over the tangent planes of samples `rows`, each through its `neighbours` nearest.
 
@@ -66,47 +80,50 @@ def fit_quadrics(points, rows, neighbours: int, progress=None, clusters: Cluster
         return nested_quadrics(points, rows, (neighbours,), progress)[0]
     means = (clusters or Clusters(points)).means(2 ** int(np.ceil(np.log2(neighbours / _MEANS))))
     share = len(means) / len(points)
-    (found,) = _through(means, points[rows], (round(share * neighbours),), progress)
+    (found,) = _through(means, points[rows], (round(share * neighbours),), _quadrics, progress)
     return replace(found, leverage=share * found.leverage)
 
 
 def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
     """The same through each of several numbers of neighbours, `sizes`, in rising order, all of them singly."""
-    return _through(points, points[rows], sizes, progress)
+    return _through(points, points[rows], sizes, _quadrics, progress)
 
 
-def _through(points, places, sizes, progress):
-    """Quadrics of places (m,3) through each of several numbers of the nearest points (n,3)."""
+def nested_residuals(points, rows, sizes, progress=None) -> list[Residuals]:
+    """What the neighbours of samples `rows` (m,) are off those quadrics, before any of them loses weight."""
+    return _through(points, points[rows], sizes, _residuals, progress)
+
+
+def _through(points, places, sizes, way, progress):
+    """What a `way` of fitting finds at places (m,3) through each of several numbers of the nearest points (n,3)."""
     tree, columns, most = KDTree(points), points.T.copy(), int(sizes[-1])
-    found = [Quadrics(np.empty((len(places), 3)), *np.empty((3, len(places)))) for _ in sizes]
 
     def fit(part):
         distance, index = tree.query(places[part], k=most)
         offset = [x.take(index) - x_here[:, None] for x, x_here in zip(columns, places[part].T, strict=True)]
-        for quadrics, k in zip(found, sizes, strict=True):
+
+        def pieces(k):
             for first in range(0, len(index), step := max(1, _CHUNK // k)):
                 some = slice(first, first + step)
-                piece = _fit([x[some, :k].copy() for x in offset], distance[some, :k].copy())
-                at = slice(part.start + first, min(part.start + first + step, part.stop))
-                quadrics.step[at], quadrics.height[at], quadrics.leverage[at], quadrics.radius[at] = piece
+                yield way([x[some, :k].copy() for x in offset], distance[some, :k].copy())
 
-    work_through(fit, even_chunks(len(places), max(1, _QUERIED // most), Progress.of(progress)))
-    return found
+        return [_joined(list(pieces(k))) for k in sizes]
+
+    chunks = even_chunks(len(places), max(1, _QUERIED // most), Progress.of(progress))
+    parts = [found for _, found in in_order(fit, chunks)]
+    return [_joined(found) for found in zip(*parts, strict=True)]
 
 
-def _fit(offset, distance):
-    """Step, height, leverage and radius of quadrics through neighbours with offsets, three (m,k), from the sample."""
+def _joined(pieces):
+    columns = zip(*(vars(piece).values() for piece in pieces), strict=True)
+    return type(pieces[0])(*map(np.concatenate, columns))
+
+
+def _quadrics(offset, distance):
+    """Quadrics through neighbours with offsets, three (m,k), from the sample and distances (m,k), ascending."""
     radius = distance[:, -1:]
-    weight = np.exp(-_DECAY * (distance / radius) ** 2)
-    normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
-    frame = tangent_frames(normal)
-    axes = frame[:, 0] / radius, frame[:, 1] / radius, normal
-    x, y, height = (dots(offset, axis.T[:, :, None]) for axis in axes)
-    basis = x, y, x * x, x * y, y * y
-    coefficients, *_ = _weighted_fit(basis, weight, height)
-    residual = height - coefficients[:, :1]
-    for a, term in enumerate(basis, start=1):
-        residual -= coefficients[:, a, None] * term
+    normal, frame, basis, weight, height = _in_frames(offset, distance)
+    residual = _off_fit(basis, weight, height)
     scale = _CAUCHY * GAUSS * np.median(np.abs(residual), axis=1, keepdims=True)
     weight = weight / (1.0 + (residual / np.maximum(scale, _EXACT * radius)) ** 2)
     coefficients, matrix, full = _weighted_fit(basis, weight, height)
@@ -116,7 +133,39 @@ def _fit(offset, distance):
     squared = row_dots(upright, upright)
     step = (coefficients[:, 0] / squared)[:, None] * upright
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
-    return step, np.abs(coefficients[:, 0]) / np.sqrt(squared), np.minimum(leverage, 0.95), radius[:, 0]
+    height = np.abs(coefficients[:, 0]) / np.sqrt(squared)
+    return Quadrics(step, height, np.minimum(leverage, 0.95), radius[:, 0])
+
+
+def _residuals(offset, distance):
+    """Residuals of such neighbours."""
+    normal, _, basis, weight, height = _in_frames(offset, distance)
+    squared = _off_fit(basis, weight, height) ** 2
+    weight /= np.einsum("mk->m", weight)[:, None]
+    second, fourth = row_dots(weight, squared), row_dots(weight * squared, squared)
+    with np.errstate(invalid="ignore"):
+        return Residuals(fourth / second**2, np.sqrt(second), normal)
+
+
+def _in_frames(offset, distance):
+    """Of such neighbours: normals (m,3) of the weighted principal planes and frames (m,2,3) in them; the terms x, y,
+    xx, xy, yy, in radii, five (m,k); weights, and heights over the planes, (m,k)."""
+    radius = distance[:, -1:]
+    weight = np.exp(-_DECAY * (distance / radius) ** 2)
+    normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
+    frame = tangent_frames(normal)
+    axes = frame[:, 0] / radius, frame[:, 1] / radius, normal
+    x, y, height = (dots(offset, axis.T[:, :, None]) for axis in axes)
+    return normal, frame, (x, y, x * x, x * y, y * y), weight, height
+
+
+def _off_fit(basis, weight, height):
+    """How far heights (m,k) are off the terms 1 and `basis` that fit them best."""
+    coefficients, *_ = _weighted_fit(basis, weight, height)
+    residual = height - coefficients[:, :1]
+    for a, term in enumerate(basis, start=1):
+        residual -= coefficients[:, a, None] * term
+    return residual
 
 
 def _least_spread(offset, share):

@@ -142,6 +142,42 @@ def test_shifted_scans_are_noisy_as_a_whole(height, share):
     assert noisy_samples(points, local_spacing(points)).all()
 
 
+def walled(points, normals, share):
+    """Points at random on two sheets that are `share` local spacings apart all over."""
+    side = np.random.default_rng(1).choice([-0.5, 0.5], len(points)) * share * np.median(local_spacing(points))
+    return points + side[:, None] * normals
+
+
+@pytest.mark.parametrize("share", [0.2, 0.3, 0.5])
+def test_thin_walls_are_no_noise(share):
+    """They look like it, and like scans shifted against each other but for their distance, the same all over."""
+    ball = shapes.scattered_sphere(5000)
+    points = walled(ball, ball, share)
+    assert looks_noisy(points, local_spacing(points))
+    assert not noisy_samples(points, local_spacing(points)).any()
+
+
+def test_walls_of_two_thicknesses_are_no_noise():
+    """A shift would fit a base and a lid of any thickness."""
+    floor = shapes.square(4000) + np.array([1.0, 0, 0])
+    base, lid = (walled(floor, np.array([0, 0, 1.0]), share) for share in (0.3, 0.5))
+    x, y, z = lid.T
+    c, s = np.cos(np.radians(120)), np.sin(np.radians(120))
+    points = np.concatenate([base, np.column_stack([c * x - s * z, y, s * x + c * z])])
+    assert looks_noisy(points, local_spacing(points))
+    assert not noisy_samples(points, local_spacing(points)).any()
+
+
+def test_noise_beside_thin_walls_is_found():
+    """The cloud looks noisy as a whole; as it has walls, its parts are looked at."""
+    ball = shapes.scattered_sphere(8000)
+    half, spacing = ball[:, 0] > 0, np.median(local_spacing(ball))
+    points = np.where(half[:, None], noisy(ball, 0.1 * spacing), walled(ball, ball, 1.0))
+    found = noisy_samples(points, local_spacing(points))
+    assert found[half].mean() > 0.9
+    assert not found[ball[:, 0] < -0.5].any()
+
+
 def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():
     ring = shapes.torus(6000, major=1.0, minor=0.15)
     few, many = (np.median(estimate_noise(noisy(ring, deviation)).neighbours) for deviation in (0.002, 0.02))

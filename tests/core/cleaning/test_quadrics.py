@@ -1,6 +1,7 @@
 import numpy as np
+import pytest
 
-from core.cleaning.quadrics import fit_quadrics, nested_quadrics
+from core.cleaning.quadrics import fit_quadrics, nested_quadrics, nested_residuals
 from tests import shapes
 
 
@@ -78,3 +79,23 @@ def test_clusters_stand_for_the_points_of_wide_neighbourhoods():
     assert np.linalg.norm(wide.step - singly.step, axis=1).mean() < 0.1 * singly.height.mean()
     np.testing.assert_allclose(np.median(wide.leverage), np.median(singly.leverage), rtol=0.1)
     np.testing.assert_allclose(np.median(wide.radius), np.median(singly.radius), rtol=0.1)
+
+
+def test_residuals_tell_two_sheets_from_noise():
+    """Kurtosis is 1 on two sheets, 3 in Gaussian and 1.8 in uniform noise, and the quadric follows a little of either;
+    where nothing is off there is none."""
+    flat, rng = shapes.random_rotation(2) @ np.array([0, 0, 1.0]), np.random.default_rng(0)
+    square = shapes.square(4000) @ shapes.random_rotation(2).T
+    rows = np.flatnonzero(np.abs(square @ shapes.random_rotation(2)).max(axis=1) < 0.6)
+    for off, kurtosis, rel in [
+        (rng.choice([-1.0, 1.0], 4000), 1.0, 0.2),
+        (rng.normal(size=4000), 3.0, 0.1),
+        (np.sqrt(3) * rng.uniform(-1, 1, 4000), 1.8, 0.15),
+    ]:
+        (found,) = nested_residuals(square + 0.01 * off[:, None] * flat, rows, (128,))
+        assert np.median(found.kurtosis) == pytest.approx(kurtosis, rel=rel)
+        assert np.median(found.level) == pytest.approx(0.01, rel=0.1)
+        assert np.median(np.abs(found.normal @ flat)) > 0.99
+    (found,) = nested_residuals(shapes.square(400), np.arange(9), (32,))
+    assert not (found.kurtosis < 1).any()
+    assert found.level.max() < 1e-12

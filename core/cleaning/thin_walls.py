@@ -1,0 +1,53 @@
+"""Thin walls, told from noise: samples of two close sheets look noisy, but lie on the one or the other."""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..linalg import COMPONENTS
+from .quadrics import nested_residuals
+
+_SIZES = 32, 64, 128, 256  # neighbours: more than that see where walls end
+_TWO = 1.6  # kurtosis below which samples are on two sheets; uniform noise leaves 1.8
+_AROUND = 12  # anchors, over which it is typical
+_LEAST = 0.05  # local spacings, half the distance of two sheets, at least
+_MOST = 2.0  # times the noise there seems to be, at most: walls farther apart do not look like that
+_SHARE = 0.015  # of the anchors, at least, near two sheets; on noise of .1 to 1.5 spacings at most .005 are
+_SHIFTED = 0.35  # times the squared errors of one distance all over, below which a shift explains them
+_AXES, _DIVERSE = 3, 0.1  # normals along few axes leave hardly this share of the largest singular value in the fourth
+
+
+def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> bool:
+    """Whether samples (n,3) that seem to have noise of `level` local spacings are of thin walls, and free of noise.
+
+    points  : (n,3) float64, n > 32     spacing : (n,) float64, local spacing, same units
+    anchors : (m,) int, rows that look noisy
+
+    Noise spreads samples about one sheet. Where they show two instead, sharply, there is none; elsewhere what looks
+    like noise is detail, too, such as walls that run in all directions. Two scans of one surface, shifted against each
+    other, also show two sheets; but these are as far apart as the shift is long along the normal, walls all over alike.
+    """
+    fits = nested_residuals(points, anchors, [k for k in _SIZES if k < len(points)], progress)
+    around = KDTree(points[anchors]).query(points[anchors], k=min(_AROUND, len(anchors)), workers=-1)[1]
+    kurtosis = np.stack([np.median(fit.kurtosis[around], axis=1) for fit in fits])
+    best, row = np.nan_to_num(kurtosis, nan=np.inf).argmin(axis=0), np.arange(len(anchors))
+    half = np.stack([fit.level for fit in fits])[best, row]
+    relative = half / spacing[anchors]
+    two = (kurtosis[best, row] < _TWO) & (relative > _LEAST) & (relative < _MOST * level)
+    if two.sum() < max(_AROUND, _SHARE * len(two)):
+        return False
+    return not _shifted(half[two], np.stack([fit.normal for fit in fits])[best, row][two])
+
+
+def _shifted(half, normal):
+    """Whether half the distances (m,) of two sheets with normals (m,3) are those of a shift. With few
+    directions one may fit walls, too."""
+    products = np.stack([(1 if a == b else 2) * normal[:, a] * normal[:, b] for a, b in COMPONENTS], axis=1)
+    squares, _, _, kinds = np.linalg.lstsq(products, half**2, rcond=None)
+    if kinds[_AXES] < _DIVERSE * kinds[0]:
+        return False
+    matrix = np.empty((3, 3))
+    for (a, b), value in zip(COMPONENTS, squares, strict=True):
+        matrix[a, b] = matrix[b, a] = value
+    squared, axes = np.linalg.eigh(matrix)
+    off = half - np.abs(normal @ axes[:, -1]) * np.sqrt(max(squared[-1], 0.0))
+    return off @ off < _SHIFTED * len(half) * half.var()
