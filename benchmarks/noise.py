@@ -31,6 +31,7 @@ from .noise_measure import (
     SHIFTS,
     SLIGHT,
     STRAYS,
+    WALLS,
     measure_between,
     measure_faint,
     measure_half,
@@ -39,6 +40,7 @@ from .noise_measure import (
     measure_shifted,
     measure_slight,
     measure_strays,
+    measure_walls,
     share_noisy,
 )
 from .noise_plots import picture, plot_noise
@@ -128,6 +130,13 @@ Every point is of the one or the other scan, at random, and these are apart by s
 CD (HD) to the surface halfway.
 
 {shifted}
+
+### Thin walls
+
+Every point is of the one or the other sheet, at random, of a wall that is so many local spacings thick all over. There
+is no noise. CD (HD) to both sheets.
+
+{walls}
 
 ### Noise in one half
 
@@ -255,6 +264,7 @@ def measure(cases: list[Case], others: list[Path], shape: Path) -> dict:
         ],
         "slight": [said(f"{case.name}, slight noise", measure_slight(case, by)) for case in cases for by in SLIGHT],
         "shifted": [said(f"{case.name}, two scans", measure_shifted(case, by)) for case in cases for by in SHIFTS],
+        "walls": [said(f"{case.name}, thin walls", measure_walls(case, by)) for case in cases[:2] for by in WALLS],
         "between": [said(f"{case.name}, {p} %", measure_between(case, p)) for case in cases for p in published.NOISE],
         "costs": list(_costs(others, shape)),
         **_stopping(),
@@ -330,6 +340,7 @@ def write_page(measured: dict, docs: Path) -> Path:
         published=tables.markdown(tables.beside_published(measured)),
         more=tables.markdown(tables.more(measured["more"])),
         slight=tables.markdown(tables.by_level(measured["slight"], "noise")),
+        walls=tables.markdown(tables.by_level(measured["walls"], "thickness")),
         shifted=tables.markdown(tables.by_level(measured["shifted"], "shift")),
         faint=tables.markdown(tables.faint(measured["faint"])),
         wire_runs=noise_wires.RUNS,

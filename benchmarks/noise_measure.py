@@ -11,6 +11,7 @@ from core.cleaning.noise import noisy_samples
 from core.cleaning.offsets import alternate
 from core.normals.pca import pca_normals
 from core.points import local_spacing, prepare_samples
+from scripts.render import vertex_normals
 
 from .cases import Case
 from .geometry import closest_points, face_normals, surface_samples
@@ -25,6 +26,7 @@ FAINT = [("slab", 0.5, level) for level in (0.05, 0.1, 0.15, 0.2)]  # part, its 
 FAINT += [("cap", share, 0.4) for share in (0.04, 0.08)]
 SLIGHT = (0.01, 0.02, 0.03, 0.05, 0.08)  # local spacings
 SHIFTS = (0.05, 0.1, 0.2, 0.3, 0.5)  # local spacings
+WALLS = (0.1, 0.2, 0.3, 0.5, 1.0)  # local spacings
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
 JET_NEIGHBOURS = 24
@@ -202,6 +204,17 @@ def measure_shifted(case: Case, level: float) -> dict:
     second = np.random.default_rng(0).random(len(case.points)) < 0.5
     halfway = replace(case.truth, vertices=case.truth.vertices + 0.5 * step)
     return _by_level(case.name, level, case.points + second[:, None] * step, halfway)
+
+
+def measure_walls(case: Case, level: float) -> dict:
+    """What is made of thin walls, samples of two sheets `level` median local spacings apart along the normals, see
+    :func:`_by_level`; both are the true surface."""
+    half = 0.5 * level * np.median(local_spacing(case.points))
+    sign = np.random.default_rng(0).choice((-1.0, 1.0), len(case.points))
+    along, count = vertex_normals(case.truth.vertices, case.truth.faces), len(case.truth.vertices)
+    sheets = np.concatenate([case.truth.vertices + step * along for step in (-half, half)])
+    truth = Mesh(sheets, np.concatenate([case.truth.faces, case.truth.faces + count]))
+    return _by_level(case.name, level, case.points + (half * sign)[:, None] * case.normals, truth)
 
 
 def _by_level(name, level, points, truth):

@@ -9,7 +9,7 @@ from .quadrics import nested_residuals
 _SIZES = 32, 64, 128, 256  # neighbours: more than that see where walls end
 _TWO = 1.6  # kurtosis below which samples are on two sheets; uniform noise leaves 1.8
 _AROUND = 12  # anchors, over which it is typical
-_LEAST = 0.05  # local spacings, half the distance of two sheets, at least
+_LEAST = 0.08  # local spacings, half the distance of two sheets, at least: closer ones err as much as one in the middle
 _MOST = 2.0  # times the noise there seems to be, at most: walls farther apart do not look like that
 _SHARE = 0.015  # of the anchors, at least, near two sheets; on noise of .1 to 1.5 spacings at most .005 are
 _SHIFTED = 0.35  # times the squared errors of one distance all over, below which a shift explains them

@@ -13,7 +13,7 @@ pytest.importorskip("igl")
 
 from benchmarks import noise_hostile, noise_measure, published
 from benchmarks.cases import Case
-from benchmarks.geometry import surface_samples
+from benchmarks.geometry import face_normals, surface_samples
 from benchmarks.metrics import surface_errors
 from benchmarks.noise import CASES, SHAPE, main, verdicts, write_page
 from benchmarks.noise_hostile import FILES, POINTS, tried
@@ -27,6 +27,7 @@ from benchmarks.noise_measure import (
     measure_shifted,
     measure_slight,
     measure_strays,
+    measure_walls,
     noisy,
     share_noisy,
     strewn,
@@ -105,6 +106,18 @@ def test_slight_noise_is_moved_as_all_noise_is_and_so_are_shifted_scans(measure,
     assert found["ours"] == found["every"]
     assert found["ours"]["cd"] < found["none"]["cd"]
     assert measure(case, 0.0)["moved"] == 0.0
+
+
+def test_thin_walls_stay_and_both_sheets_are_the_truth(monkeypatch):
+    monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
+    monkeypatch.setattr(noise_measure, "Settings", partial(Settings, resolution=64))
+    truth = closed.torus().mesh
+    points, face = surface_samples(truth, 3000, np.random.default_rng(1))
+    case = Case("torus", points, face_normals(truth)[face], truth, np.empty((0, 3)), {"category": "watertight"})
+    found = measure_walls(case, 0.5)
+    assert found["moved"] == 0.0
+    assert found["ours"] == found["none"]
+    assert found["ours"]["cd"] < 0.8 * found["every"]["cd"]
 
 
 def test_more_points_of_the_same_noise_come_closer(monkeypatch):
@@ -249,6 +262,10 @@ def made_up(nc=0.99, cd=0.8, outcome="refused", silence=0.2, said=1.1, lost=0.0)
         "shifted": [
             {"case": "one", "level": 0.2, "moved": 0.5}
             | {way: {"cd": cd, "hd": 8.4} for way, cd in (("ours", 0.24), ("none", 0.53), ("every", 0.22))}
+        ],
+        "walls": [
+            {"case": "one", "level": 0.7, "moved": 0.0}
+            | {way: {"cd": cd, "hd": 7.4} for way, cd in (("ours", 0.54), ("none", 0.54), ("every", 1.22))}
         ],
         "between": [{"case": case, "percent": percent, "cd": 0.625} for case in CASES for percent in published.NOISE],
         "costs": [
