@@ -46,10 +46,11 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         return clean
     progress = Progress.of(progress)
     found = roughness(points, spacing, seed, progress)
-    for suspect in _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.7)):
-        level = np.median(found.relative[suspect]) if suspect.any() else 0.0
-        if level and not shows_thin_walls(points, spacing, found.anchors[suspect], level, progress.part(0.7, 0.9)):
-            break
+    for suspect, part in _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.9)):
+        if suspect.any():
+            level = np.median(found.relative[suspect])
+            if not shows_thin_walls(points, spacing, found.anchors[suspect], level, part):
+                break
     else:
         return clean
     if suspect.all():
@@ -60,16 +61,16 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
 
 def _noisy_anchors(points, spacing, found, seed, progress):
     """Which anchors are noisy by how rough they are found and how far normals agree, (m,) bool: all, where the cloud is
-    as a whole, and those of its parts."""
+    as a whole, and then those of its parts; each with a slice of the progress for a closer look."""
     if found.whole:
         agreement = _typical_agreement(points, spacing, seed, progress.part(0.0, 0.3))
         turned = agreement < 1 - _TURNED * np.median(found.relative) ** 2
         if (found.loud and agreement < _AGREED) or (found.slight and turned):
-            yield np.ones(len(found.anchors), bool)
+            yield np.ones(len(found.anchors), bool), progress.part(0.3, 0.4)
     parts = found.even
     if found.suspect.sum() >= least_part(found.anchors):
-        parts = parts | _around_loud_cores(found, _agreement(points, spacing, progress.part(0.3, 1.0)))
-    yield parts
+        parts = parts | _around_loud_cores(found, _agreement(points, spacing, progress.part(0.4, 0.8)))
+    yield parts, progress.part(0.8, 1.0)
 
 
 def _around_loud_cores(found, confidence):

@@ -39,8 +39,8 @@ def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> b
 
 
 def _shifted(half, normal):
-    """Whether half the distances (m,) of two sheets with normals (m,3) are those of a shift. With few
-    directions one may fit walls, too."""
+    """Whether half the distances (m,) of two sheets with normals (m,3) are those of a shift. With few directions one
+    may fit walls, too."""
     products = np.stack([(1 if a == b else 2) * normal[:, a] * normal[:, b] for a, b in COMPONENTS], axis=1)
     squares, _, _, kinds = np.linalg.lstsq(products, half**2, rcond=None)
     if kinds[_AXES] < _DIVERSE * kinds[0]:

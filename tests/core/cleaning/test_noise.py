@@ -173,9 +173,11 @@ def test_noise_beside_thin_walls_is_found():
     ball = shapes.scattered_sphere(8000)
     half, spacing = ball[:, 0] > 0, np.median(local_spacing(ball))
     points = np.where(half[:, None], noisy(ball, 0.1 * spacing), walled(ball, ball, 1.0))
-    found = noisy_samples(points, local_spacing(points))
+    heard = []
+    found = noisy_samples(points, local_spacing(points), progress=lambda share, _: heard.append(share))
     assert found[half].mean() > 0.9
     assert not found[ball[:, 0] < -0.5].any()
+    assert heard == sorted(heard)
 
 
 def test_more_noise_takes_more_neighbours_and_more_curvature_fewer():
