@@ -49,14 +49,12 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     for suspect, part in _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.9)):
         if suspect.any():
             level = np.median(found.relative[suspect])
+            suspect = suspect[found.region[:, :SMOOTHING]].any(axis=1)  # noise left beside would stand out as a seam
             if not shows_thin_walls(points, spacing, found.anchors[suspect], level, part):
                 break
     else:
         return clean
-    if suspect.all():
-        return ~clean
-    noisy = suspect[found.region[:, :SMOOTHING]].any(axis=1)  # noise left beside them would stand out as a seam
-    return noisy[nearest_anchor(points, points[found.anchors], progress.part(0.9, 1.0))]
+    return suspect[nearest_anchor(points, points[found.anchors], progress.part(0.9, 1.0))]
 
 
 def _noisy_anchors(points, spacing, found, seed, progress):
