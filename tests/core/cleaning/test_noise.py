@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from core.cleaning.noise import looks_noisy, noisy_samples
 from core.cleaning.noise_level import LADDER, estimate_noise, in_full
@@ -161,9 +162,7 @@ def test_walls_of_two_thicknesses_are_no_noise():
     """A shift would fit a base and a lid of any thickness."""
     floor = shapes.square(4000) + np.array([1.0, 0, 0])
     base, lid = (walled(floor, np.array([0, 0, 1.0]), share) for share in (0.3, 0.5))
-    x, y, z = lid.T
-    c, s = np.cos(np.radians(120)), np.sin(np.radians(120))
-    points = np.concatenate([base, np.column_stack([c * x - s * z, y, s * x + c * z])])
+    points = np.concatenate([base, Rotation.from_euler("y", -120, degrees=True).apply(lid)])
     assert looks_noisy(points, local_spacing(points))
     assert not noisy_samples(points, local_spacing(points)).any()
 
