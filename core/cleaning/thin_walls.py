@@ -3,17 +3,19 @@
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import COMPONENTS
+from ..linalg import outer, principal_axes
 from .quadrics import nested_residuals
 
 _SIZES = 32, 64, 128, 256  # neighbours: more than that see where walls end
 _TWO = 1.6  # kurtosis below which samples are on two sheets; uniform noise leaves 1.8
 _AROUND = 12  # anchors, over which it is typical
 _LEAST = 0.08  # local spacings, half the distance of two sheets, at least: closer ones err as much as one in the middle
+_SEEN = 0.05  # local spacings, half the distance of two sheets that say whether there is a shift, at least
 _MOST = 2.0  # times the noise there seems to be, at most: walls farther apart do not look like that
 _SHARE = 0.015  # of the anchors, at least, near two sheets; on noise of .1 to 1.5 spacings at most .005 are
 _SHIFTED = 0.35  # times the squared errors of one distance all over, below which a shift explains them
 _AXES, _DIVERSE = 3, 0.1  # normals along few axes leave hardly this share of the largest singular value in the fourth
+_TWICE = np.array([1, 1, 1, 2, 2, 2])  # how often a product of two components stands in a symmetric form
 
 
 def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> bool:
@@ -32,8 +34,8 @@ def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> b
     best, row = np.nan_to_num(kurtosis, nan=np.inf).argmin(axis=0), np.arange(len(anchors))
     half = np.stack([fit.level for fit in fits])[best, row]
     relative = half / spacing[anchors]
-    two = (kurtosis[best, row] < _TWO) & (relative > _LEAST) & (relative < _MOST * level)
-    if two.sum() < max(_AROUND, _SHARE * len(two)):
+    two = (kurtosis[best, row] < _TWO) & (relative > _SEEN) & (relative < _MOST * level)
+    if (two & (relative > _LEAST)).sum() < max(_AROUND, _SHARE * len(two)):
         return False
     return not _shifted(half[two], np.stack([fit.normal for fit in fits])[best, row][two])
 
@@ -41,13 +43,11 @@ def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> b
 def _shifted(half, normal):
     """Whether half the distances (m,) of two sheets with normals (m,3) are those of a shift. With few directions one
     may fit walls, too."""
-    products = np.stack([(1 if a == b else 2) * normal[:, a] * normal[:, b] for a, b in COMPONENTS], axis=1)
+    products = outer(normal) * _TWICE
     squares, _, _, kinds = np.linalg.lstsq(products, half**2, rcond=None)
     if kinds[_AXES] < _DIVERSE * kinds[0]:
         return False
-    matrix = np.empty((3, 3))
-    for (a, b), value in zip(COMPONENTS, squares, strict=True):
-        matrix[a, b] = matrix[b, a] = value
-    squared, axes = np.linalg.eigh(matrix)
-    off = half - np.abs(normal @ axes[:, -1]) * np.sqrt(max(squared[-1], 0.0))
+    axis = principal_axes(squares[None])
+    squared = max(((outer(axis) * _TWICE) @ squares).item(), 0.0)
+    off = half - np.abs(normal @ axis[0]) * np.sqrt(squared)
     return off @ off < _SHIFTED * len(half) * half.var()
