@@ -197,5 +197,4 @@ def _around(own, k, surface):
     points, normals = surface.columns.points, surface.normals.T
     between = np.stack([x.take(near) - x[own, None] for x in points])
     own_normals, theirs = normals[:, own, None], np.stack([column.take(near) for column in normals])
-    room = surface.columns.room[own, None]
-    return away, near, membership(between, dots(between, own_normals), dots(between, theirs), room)
+    return away, near, membership(between, dots(between, own_normals), dots(between, theirs))

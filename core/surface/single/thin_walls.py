@@ -4,12 +4,16 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ..mesh import Mesh
+from ...linalg import cross, dots, lengths
+from ..mesh import Mesh, at_corners
 from ..meshing.misfit import chamfer
 from ..meshing.pieces import pieces_of
 from .orientation import orient
 
-_ONCE = 1.25  # times the area of the single layer there; both sides of an open sheet have twice that
+_TWICE = 1 / 3  # of the area of a piece, at most, with the other layer flush with it
+_FLUSH = 0.05  # cells; both layers on an open sheet lie so close to each other, the two sheets of a wall do not
+_OPPOSITE = -0.5  # cosine between normals of faces on either layer, at most
+_AROUND = 12  # faces around one, among them that of the other layer
 _SMALL = 0.002  # of the area of the cover, smaller pieces are not looked at
 
 
@@ -22,30 +26,36 @@ def with_thin_walls(sheet: Mesh, unoriented: int, cover: Mesh, surface: LocalSur
     goes to and fro between the two. The cover is around both, and is what bounds the wall.
     """
     count, piece = pieces_of(cover)
-    piece, centres = piece[cover.faces[:, 0]], _centres(cover)
-    beside, share = KDTree(centres), np.bincount(piece, cover.face_areas(), count)
-    of = piece[beside.query(_centres(sheet), workers=-1)[1]]
-    once = share < _ONCE * np.bincount(of, sheet.face_areas(), count)
-    tried = np.flatnonzero(once & (share > _SMALL * share.sum()))
+    piece, area = piece[cover.faces[:, 0]], cover.face_areas()
+    middles = KDTree(_middles(cover))
+    twice, share = (np.bincount(piece, a, count) for a in (area * _has_other_layer(cover, middles, cell), area))
+    tried = np.flatnonzero((twice < _TWICE * share) & (share > _SMALL * share.sum()))
     if not len(tried):
         return sheet, unoriented
-    home = piece[beside.query(surface.points, workers=-1)[1]]
-    walls = [
-        number
-        for number in tried
-        if _closer(cover, piece == number, sheet, of == number, home == number, surface, cell)
-    ]
+    of, home = (piece[middles.query(x, workers=-1)[1]] for x in (_middles(sheet), surface.points))
+
+    def is_closer(number):
+        points = surface.points[home == number]
+        ours, theirs = (mesh.part(at == number) for mesh, at in ((cover, piece), (sheet, of)))
+        return chamfer(ours, surface, cell, points) < chamfer(theirs, surface, cell, points)
+
+    walls = [number for number in tried if is_closer(number)]
     if not walls:
         return sheet, unoriented
     rest, unoriented = orient(sheet.part(~np.isin(of, walls)))
     return rest.joined(cover.part(np.isin(piece, walls))), unoriented
 
 
-def _closer(cover, walls, sheet, torn, samples, surface, cell):
-    points = surface.points[samples]
-    ours, theirs = (chamfer(mesh.part(faces), surface, cell, points) for mesh, faces in ((cover, walls), (sheet, torn)))
-    return ours < theirs
+def _has_other_layer(cover, middles, cell):
+    """Which faces of a double cover, (f,) bool, have one of its other layer flush with them."""
+    near = middles.query(middles.data, k=range(2, 2 + min(_AROUND, middles.n - 1)), workers=-1)[1]
+    a, b, c = at_corners(cover.vertices, cover.faces)
+    normal = cross(b - a, c - a)
+    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    step = (middles.data[near] - middles.data[:, None]).transpose(2, 0, 1)
+    flush = np.abs(dots(step, normal[:, :, None])) < _FLUSH * cell
+    return (flush & (dots(normal[:, near], normal[:, :, None]) < _OPPOSITE)).any(axis=1)
 
 
-def _centres(mesh):
+def _middles(mesh):
     return mesh.vertices[mesh.faces].mean(axis=1)

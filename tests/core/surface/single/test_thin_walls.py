@@ -50,6 +50,14 @@ def test_a_wall_is_as_thick_as_it_is_and_wound_outwards(beside_disc):
     assert shapes.signed_volume(wall) == pytest.approx(np.pi * (0.5**2 - (0.5 - WALL) ** 2), rel=0.02)
 
 
+def test_a_ball_pressed_flat_is_one_wall():
+    """It is .8 cells thick."""
+    found = run(shapes.scattered_sphere(4000) * [1, 1, 0.02] @ shapes.random_rotation(4).T, denoise=0)
+    np.testing.assert_array_equal(found.sheet.vertices, found.surface.vertices)
+    assert shapes.euler(found.sheet) == 2
+    assert found.report["warnings"] == []
+
+
 def test_quads_stay_quads():
     sheet = run(tube(12_000), faces="quads").sheet
     assert sheet.pairs > 0.4 * len(sheet.faces)
