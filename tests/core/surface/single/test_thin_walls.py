@@ -80,3 +80,5 @@ def test_both_sides_of_an_open_sheet_are_no_wall(shape, monkeypatch):
     same, unoriented = thin_walls.with_thin_walls(found.sheet, 3, found.surface, surface, found.field.spacing)
     assert same is found.sheet
     assert unoriented == 3
+    nothing = found.surface.part(np.zeros(len(found.surface.faces), bool))
+    assert thin_walls.with_thin_walls(found.sheet, 3, nothing, surface, found.field.spacing)[0] is found.sheet
