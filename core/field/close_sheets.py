@@ -25,17 +25,20 @@ _CHUNK = 4096  # samples
 def sheet_room(cloud: Cloud, progress=None) -> np.ndarray:
     """Half the distance to the sheet beside each sample's own, (n,) float64 in units of the points: inf where none is
     closer than a local spacing, or the sheets are not told apart."""
-    seen = np.empty(len(cloud))
+    seen, room, progress = np.empty(len(cloud)), np.full(len(cloud), np.inf), Progress.of(progress)
     columns = np.ascontiguousarray(cloud.points.T), np.ascontiguousarray(cloud.normals.T)
 
     def look(part):
         seen[part] = 0.5 * _nearest_sheet(*columns, part, cloud.spacing[part], cloud.neighbours[part])
 
-    work_through(look, Progress.of(progress).chunks(len(cloud), _CHUNK))
-    around, room = seen[cloud.neighbours], np.full(len(cloud), np.inf)
-    two = np.isfinite(around)
-    several = two.mean(axis=1) > _SHARE
-    room[several] = np.nanmedian(np.where(two, around, np.nan)[several], axis=1)
+    def agree(part):
+        around = seen[cloud.neighbours[part]]
+        two = np.isfinite(around)
+        several = two.mean(axis=1) > _SHARE
+        room[part][several] = np.nanmedian(np.where(two, around, np.nan)[several], axis=1)
+
+    work_through(look, progress.part(0.0, 0.9).chunks(len(cloud), _CHUNK))
+    work_through(agree, progress.part(0.9, 1.0).chunks(len(cloud), _CHUNK))
     return room
 
 
