@@ -17,7 +17,7 @@ def room_of(points, normals):
 
 
 def wall(thickness, random, count=2000):
-    """Two sheets so many local spacings apart, bent like a wave; of one of them such spacings are .75 / sqrt(count)."""
+    """Two sheets so many local spacings apart, which are some 1.5 / sqrt(count), bent like a wave."""
     points = random.uniform(-1, 1, (2 * count, 3)) * [1, 1, 0]
     x, y, _ = points.T
     points[:, 2] = 0.1 * np.sin(3 * x) * np.cos(2 * y)
