@@ -5,6 +5,7 @@ import numpy as np
 from ..linalg import dots, row_dots, solve_positive
 from ..parallel import work_through
 from ..progress import Progress
+from .close_sheets import off_sheets
 from .cloud import Cloud
 
 _WIDTH = 1.2  # of the Gaussian weight, local spacings
@@ -14,11 +15,12 @@ _STIFFNESS = 1e-3
 _CHUNK = 2048  # samples
 
 
-def bending(cloud: Cloud, progress=None) -> np.ndarray:
+def bending(cloud: Cloud, room, progress=None) -> np.ndarray:
     """Second fundamental forms as tensors B, (n,3,3) float64: the surface near a sample has height l.B.l / 2 above the
     tangent plane at tangential offset l.
 
-    Weighted least squares over the neighbours of each sample, each giving its height and, through its normal
+    Weighted least squares over the neighbours of each sample on its sheet, which no other is closer to than `room` (n,)
+    float64, each giving its height and, through its normal
     turned to agree with the sample's, the slope there (three equations each). Curvatures are limited to one per local
     spacing.
     """
@@ -26,7 +28,9 @@ def bending(cloud: Cloud, progress=None) -> np.ndarray:
     columns = np.ascontiguousarray(cloud.points.T), np.ascontiguousarray(cloud.normals.T)
 
     def fit(part):
-        bend[part] = _bending(*columns, part, cloud.frames[part], cloud.spacing[part], cloud.neighbours[part])
+        bend[part] = _bending(
+            *columns, part, cloud.frames[part], cloud.spacing[part], room[part], cloud.neighbours[part]
+        )
 
     work_through(fit, Progress.of(progress).chunks(len(cloud), _CHUNK))
     return bend
@@ -38,14 +42,14 @@ def sag(step: np.ndarray, bend: np.ndarray) -> np.ndarray:
     return 0.5 * np.einsum("...i,...ij,...j->...", step, bend, step)
 
 
-def _bending(points, normals, rows, frames, spacing, neighbours):
+def _bending(points, normals, rows, frames, spacing, room, neighbours):
     """Points and normals component by component, (3,n)."""
     step = [column.take(neighbours) - column[rows, None] for column in points]
     theirs = [column.take(neighbours) for column in normals]
     own, first, second = normals[:, rows, None], *frames.transpose(1, 2, 0)[..., None]
     z, x, y = (dots(step, axis) for axis in (own, first, second))
     agreement = dots(theirs, own)
-    counted = np.abs(agreement) > _ALIGNED
+    counted = (np.abs(agreement) > _ALIGNED) & (off_sheets(step, agreement, z, theirs) < room[:, None])
     along_x, along_y = (dots(theirs, axis) / np.where(counted, -agreement, 1.0) for axis in (first, second))  # slopes
     squared = dots(step, step)
     apart = (z**2 + dots(step, theirs) ** 2) / squared

@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 
 from ..linalg import COMPONENTS
 from ..progress import Progress
+from .close_sheets import sheet_room
 from .cloud import Cloud
 from .curvature import bending
 from .grid import Grid
@@ -25,13 +26,14 @@ _AROUND = 32  # samples, whose median spacing is that of a place
 class Columns:
     """What projections look up, component by component; all but the points float32.
 
-    points : (3,n) float64     normals : (3,n)     bend : (6,n) xx, yy, zz, xy, xz, yz     spacing : (n,)
+    points : (3,n) float64     normals : (3,n)     bend : (6,n) xx, yy, zz, xy, xz, yz     spacing, room : (n,)
     """
 
     points: np.ndarray
     normals: np.ndarray
     bend: np.ndarray
     spacing: np.ndarray
+    room: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class LocalSurface:
 
     points, normals : (n,3) float64     spacing : (n,) float64, local spacing     bend : (n,3,3) float64
     confidence      : (n,) float64 in [0,1], of the normals
+    room            : (n,) float64, half the distance to the sheet beside each one's own, see :func:`sheet_room`
     bridge          : gaps up to this many local spacings are closed
     """
 
@@ -48,6 +51,7 @@ class LocalSurface:
     spacing: np.ndarray
     bend: np.ndarray
     confidence: np.ndarray
+    room: np.ndarray
     bridge: float
     rims: Rims
     tree: KDTree
@@ -55,7 +59,7 @@ class LocalSurface:
     @cached_property
     def columns(self) -> Columns:
         bend = np.stack([self.bend[:, a, b] for a, b in COMPONENTS])
-        single = (np.ascontiguousarray(each, np.float32) for each in (self.normals.T, bend, self.spacing))
+        single = (np.ascontiguousarray(each, np.float32) for each in (self.normals.T, bend, self.spacing, self.room))
         return Columns(np.ascontiguousarray(self.points.T), *single)
 
     @cached_property
@@ -81,11 +85,12 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     `bridge` spacings are closed."""
     progress = Progress.of(progress)
     cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))
-    bend = bending(cloud, progress.part(0.1, 0.5))
+    room = sheet_room(cloud, progress.part(0.1, 0.2))
+    bend = bending(cloud, room, progress.part(0.2, 0.5))
     rims = find_rims(cloud, bend, bridge, progress.part(0.5, 0.84))
     rims = with_openings_kept(rims, cloud, bridge, progress.part(0.84, 0.86))
     rims = with_sparser_parts_joined(rims, cloud, bridge, progress.part(0.86, 0.87))
     rims = with_line_gaps_bridged(rims, cloud, bridge, progress.part(0.87, 0.88))
     rims = with_sampling_gaps_bridged(rims, cloud, bend, bridge, progress.part(0.88, 0.9))
     rims = with_rim_lines(rims, cloud, progress.part(0.9, 1.0))
-    return LocalSurface(points, normals, spacing, bend, confidence, bridge, rims, cloud.tree)
+    return LocalSurface(points, normals, spacing, bend, confidence, room, bridge, rims, cloud.tree)

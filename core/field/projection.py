@@ -22,6 +22,7 @@ _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
 _BESIDE = 0.3  # local spacings, at most, that a foot point lies off such a patch
 _BLEND = 0.35  # sqrt(t) of the kernels, local spacings; with the paper's, about .5, farther patches count for too much
 _MEMBERSHIP = 7.0  # how fast samples off each other's sheet stop counting as one sheet
+_ROOM = 0.55  # the same beside a close sheet; half way to it, membership is that of the least member
 _OTHER_SHEETS = 2  # at most, beside that of the nearest sample
 TRUSTED = 0.95  # least confidence of a sample that stands for another sheet
 _STRAIGHT = 0.98  # least |n . axis| of such a sample; samples of more sheets are mixed where it is less
@@ -101,7 +102,7 @@ class Nearby:
     """The patches of each query's nearest samples, as the query sees them; float32 but for `sample` and `distance`.
 
     sample   : (m,k)                                     distance : (m,k) float64, ascending
-    spacing  : (m,k) local spacing of the sample
+    spacing  : (m,k) local spacing of the sample         room     : (m,k) on its sheet, beside others
     offset   : (3,m,k) from the sample to the query
     normals  : (3,m,k)                                   bend     : (6,m,k) second fundamental form
     height   : (m,k) along the normal                    above    : (m,k) over the bent patch
@@ -112,6 +113,7 @@ class Nearby:
     sample: np.ndarray
     distance: np.ndarray
     spacing: np.ndarray
+    room: np.ndarray
     offset: np.ndarray
     normals: np.ndarray
     bend: np.ndarray
@@ -141,13 +143,15 @@ def _project(surface, x, nearest):
     return found
 
 
-def membership(between, height, height_back) -> np.ndarray:
+def membership(between, height, height_back, room=np.inf) -> np.ndarray:
     """(m,k) in [0,1]: how surely samples lie on one sheet with another, from how far they are off each other's sheet
-    relative to their distance; keeps close sheets apart.
+    relative to their distance and to the room that it has beside other sheets; keeps close sheets apart.
 
     between : (3,m,k) from the one to the others     height, height_back : (m,k) off its sheet and off theirs
+    room    : (m,1) half the distance from its sheet to another, infinite where it is not given
     """
-    off = _MEMBERSHIP * (height**2 + height_back**2) / np.maximum(dots(between, between), _TINY)
+    squared = height**2 + height_back**2
+    off = np.maximum(_MEMBERSHIP * squared / np.maximum(dots(between, between), _TINY), _ROOM * squared / room**2)
     with np.errstate(over="ignore"):  # no member by far
         return np.exp(-(off**2))
 
@@ -170,7 +174,7 @@ def _nearby(surface, x, nearest):
 def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     """Samples (m,k) of a :class:`LocalSurface`, nearest first, and their distances, as queries (m,3) see them."""
     columns = surface.columns
-    spacing = columns.spacing.take(sample)
+    spacing, room = columns.spacing.take(sample), columns.room.take(sample)
     distance = np.maximum(distance, 1e-9 * spacing)
     offset = np.stack([(x[:, a, None] - columns.points[a].take(sample)).astype(np.float32) for a in range(3)])
     normals = np.stack([axis.take(sample) for axis in columns.normals])
@@ -182,7 +186,7 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     above = (height - 0.5 * dots(lateral, bent)) / np.sqrt(1 + dots(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height, _BLEND)
     patch = surface.patches.excess(sample, lateral, spacing)
-    return Nearby(sample, distance, spacing, offset, normals, bend, height, above, kernel, pull, *patch)
+    return Nearby(sample, distance, spacing, room, offset, normals, bend, height, above, kernel, pull, *patch)
 
 
 def _onto_sheet(surface, near, anchor):
@@ -212,7 +216,7 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     """Where queries fall on the sheet of their sample number `anchor` (m,)."""
     every = np.arange(len(near.sample))
     between = near.offset[:, every, anchor][:, :, None] - near.offset
-    member = membership(between, *_off_patches(near, anchor, between))
+    member = membership(between, *_off_patches(near, anchor, between), near.room[every, anchor, None])
     weight = near.kernel * member
     weight /= np.einsum("mk->m", weight)[:, None]
     axis = fused_axes(weight, near.pull, near.normals)

@@ -30,6 +30,7 @@ from .single.single_layer import (
     sheet_of_crossings,
     sheet_of_sides,
 )
+from .single.thin_walls import with_thin_walls
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
@@ -121,6 +122,14 @@ class _Layers:
         return sheet_of_crossings(*given, lambda: self.extracted, part)
 
     @cached_property
+    def walled(self) -> tuple[Mesh, int]:
+        """The same, with pieces of the double cover around thin walls, where it is rough and has no two sides;
+        see :func:`with_thin_walls`."""
+        if self.sheet is not None or not self.meetings.side_by_side or self.fit[0] <= ROUGH:
+            return self.single
+        return with_thin_walls(*self.single, self.extracted, self.local, self.grid.spacing)
+
+    @cached_property
     def single_fit(self) -> tuple[float, float]:
         """:func:`misfit` of the single layer."""
         return misfit(self.single[0], self.local, self.grid.spacing)
@@ -131,10 +140,16 @@ class _Layers:
         plain = self.sides.complete and not self.meetings.side_by_side
         return (0.0, 0.0) if plain else self.single_fit
 
+    @cached_property
+    def walled_fit(self) -> tuple[float, float]:
+        """The same of the single layer with thin walls."""
+        same = self.walled[0] is self.single[0]
+        return self.fit if same else misfit(self.walled[0], self.local, self.grid.spacing)
+
     @property
     def is_cover_better(self) -> bool:
         """Whether the single layer is torn, and the double cover is not."""
-        worst = self.fit[0]
+        worst = self.walled_fit[0]
         return worst > 1 and self.cover_fit[0] < BETTER * worst
 
     @cached_property
@@ -275,11 +290,11 @@ def extract_surfaces(
         if (missed := layers.cover_fit[1]) > _SOME:
             warnings.append(_said_of_missed(missed, "double cover", "they are merged"))
     if kind in ("single", "both"):
-        meshes["single"], unoriented = layers.single
+        meshes["single"], unoriented = layers.walled
         if layers.is_cover_better:
             meshes["single"], unoriented = layers.cover, 0
             warnings.append(_said_of_torn(local, grid))
-        elif (missed := layers.fit[1]) > _SOME:
+        elif (missed := layers.walled_fit[1]) > _SOME:
             other = "" if kind == "both" else ", or use the double cover"
             warnings.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
         if unoriented:

@@ -52,6 +52,13 @@ class Mesh:
         vertices, faces = in_use(mesh.vertices, mesh.faces)
         return replace(mesh, vertices=vertices, faces=faces.astype(np.int32))
 
+    def joined(self, other: "Mesh") -> "Mesh":
+        """This mesh and another one, in one."""
+        faces, others, pairs = self.faces, other.faces + np.int32(len(self.vertices)), (self.pairs, other.pairs)
+        halves = [each[n * k : n * (k + 1)] for k in (0, 1) for each, n in zip((faces, others), pairs, strict=True)]
+        faces = np.concatenate([*halves, faces[2 * pairs[0] :], others[2 * pairs[1] :]])
+        return Mesh(np.concatenate([self.vertices, other.vertices]), faces, sum(pairs))
+
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
         ends, count = edges_of(self.faces, len(self.vertices))

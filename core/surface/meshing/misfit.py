@@ -22,10 +22,10 @@ def misfit(mesh: Mesh, surface: LocalSurface, cell: float) -> tuple[float, float
     return max(off.mean() / _TORN, askew(mesh, surface.tree, surface.normals) / _ASKEW), (off > OFF).mean()
 
 
-def chamfer(mesh: Mesh, surface: LocalSurface, cell: float) -> float:
+def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray | None = None) -> float:
     """Chamfer distance between a mesh and the surface, in cells: the mean distance of the samples to the mesh, and that
     of the mesh, by the area of 4096 and more of its faces, to where the field has the surface; infinite for a mesh
-    without faces.
+    without faces. `points` (n,3) are the samples, where not all of them count.
 
     Either alone would choose wrong: the first does not see faces where nothing is, the second not what is missing.
     """
@@ -33,7 +33,8 @@ def chamfer(mesh: Mesh, surface: LocalSurface, cell: float) -> float:
         return np.inf
     a, b, c = at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)])
     area, off = lengths(cross(b - a, c - a)), surface.project(((a + b + c) / 3).T).distance
-    return (distances(mesh, surface.points).mean() + off @ area / area.sum()) / cell
+    points = surface.points if points is None else points
+    return (distances(mesh, points).mean() + off @ area / area.sum()) / cell
 
 
 def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ def pieces_with_samples(mesh: Mesh, samples: KDTree, cell: float) -> Mesh:
     else is small stays, since no other piece shows it.
     """
     reach = _SAMPLE_AT * cell
-    count, piece = _pieces(mesh)
+    count, piece = pieces_of(mesh)
     asked = np.flatnonzero((np.bincount(piece)[piece] < _LARGE) | (np.arange(len(piece)) % _EVERY == 0))
     distance, nearest = samples.query(mesh.vertices[asked], distance_upper_bound=reach, workers=-1)
     touched = distance < np.inf
@@ -42,7 +42,7 @@ def without_small_pieces(mesh: Mesh, share: float) -> tuple[Mesh, int]:
     """The mesh without the pieces of less than `share` of its largest piece's area, and how many these were."""
     if share == 0 or not len(mesh.faces):
         return mesh, 0
-    count, piece = _pieces(mesh)
+    count, piece = pieces_of(mesh)
     area = np.bincount(piece[mesh.faces[:, 0]], mesh.face_areas(), count)
     kept = area >= share * area.max()
     return _only(mesh, kept[piece]), int((~kept).sum())
@@ -50,12 +50,12 @@ def without_small_pieces(mesh: Mesh, share: float) -> tuple[Mesh, int]:
 
 def piece_count(mesh: Mesh) -> int:
     """Number of connected pieces, of a mesh all of whose vertices are in use."""
-    return _pieces(mesh)[0]
+    return pieces_of(mesh)[0]
 
 
 def pieces_touch(mesh: Mesh, reach: float) -> bool:
     """Whether a piece ends within `reach` of another one."""
-    count, piece = _pieces(mesh)
+    count, piece = pieces_of(mesh)
     if count == 1:
         return False
     edges, faces = mesh.edge_counts()
@@ -66,8 +66,8 @@ def pieces_touch(mesh: Mesh, reach: float) -> bool:
     return bool(((near < tree.n) & (piece[near] != piece[border, None])).any())
 
 
-def _pieces(mesh):
-    """How many connected pieces there are, and that of each vertex, (v,)."""
+def pieces_of(mesh):
+    """How many connected pieces a mesh has, all of whose vertices are in use, and the number of each vertex's, (v,)."""
     ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(mesh.vertices),) * 2)
     return connected_components(graph, directed=False)

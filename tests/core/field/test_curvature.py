@@ -9,7 +9,12 @@ from tests import shapes
 
 def forms(points, normals):
     cloud = Cloud.of(points, normals, local_spacing(points))
-    return bending(cloud), cloud.spacing
+    return bending(cloud, alone(cloud)), cloud.spacing
+
+
+def alone(cloud):
+    """The room of samples on one sheet that has no other beside it."""
+    return np.full(len(cloud), np.inf)
 
 
 def tangential(normals):
@@ -82,7 +87,7 @@ def test_forms_solve_the_weighted_equations(random):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     spacing = random.uniform(0.2, 0.4, 60)
     cloud = Cloud.of(points, normals, spacing)
-    form, frames = bending(cloud), cloud.frames
+    form, frames = bending(cloud, alone(cloud)), cloud.frames
     for i, others in enumerate(cloud.neighbours):
         rows, values = [np.sqrt(_STIFFNESS) * spacing[i] * np.eye(3)], [np.zeros(3)]
         for j in others:
@@ -100,3 +105,11 @@ def test_forms_solve_the_weighted_equations(random):
         expected = np.array([[xx, xy], [xy, yy]])
         expected *= min(1.0, 1 / (np.linalg.norm(expected) * spacing[i]))
         np.testing.assert_allclose(form[i], frames[i].T @ expected @ frames[i], atol=1e-6)
+
+
+def test_samples_of_a_sheet_beside_do_not_bend_it(random):
+    points = random.uniform(-1, 1, (1000, 3)) * [1, 1, 0]
+    points[::2, 2] = 0.03
+    cloud = Cloud.of(points, np.tile([0.0, 0.0, 1.0], (1000, 1)), local_spacing(points))
+    assert np.abs(bending(cloud, alone(cloud))).max() > 1
+    np.testing.assert_allclose(bending(cloud, np.full(1000, 0.015)), 0, atol=1e-9)

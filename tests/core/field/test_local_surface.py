@@ -56,9 +56,29 @@ def test_where_samples_of_a_curved_sheet_are_few_feet_do_not_jump(n, most):
 
 def test_the_more_off_each_others_sheets_for_their_distance_the_less_samples_are_of_one():
     between = np.array([[1.0, 1.0, 2.0, 1.0], [0, 0, 0, 0], [0, 0, 0, 0]])[:, None]
-    member = membership(between, np.array([[0.0, 0.2, 0.4, 0.4]]), np.array([[0.0, 0.2, -0.4, 0.4]]))[0]
+    heights = np.array([[0.0, 0.2, 0.4, 0.4]]), np.array([[0.0, 0.2, -0.4, 0.4]])
+    member = membership(between, *heights, np.array([[np.inf]]))[0]
     assert member[0] == 1
     assert member[1] == member[2] > MEMBER > member[3] > 0
+
+
+def test_beside_another_sheet_half_way_to_it_no_sample_is_of_ones_own_however_far_along():
+    between, room = np.array([[1.0, 3.0, 9.0, 27.0], [0, 0, 0, 0], [0, 0, 0, 0]])[:, None], np.array([[0.1]])
+    for height, own in ((0.0, True), (0.05, True), (0.102, False), (0.2, False)):
+        member = membership(between, np.full((1, 4), height), np.full((1, 4), height), room)
+        assert ((member > MEMBER) == own).all()
+
+
+@pytest.mark.parametrize("gap", [0.2, 0.5])
+def test_the_two_sheets_of_a_thin_wall_are_where_they_are(gap, random):
+    """From outside of either, at places that see the other through the voids in it."""
+    points, apart = random.uniform(-1, 1, (3000, 3)) * [1, 1, 0], gap * 0.03
+    points[::2, 2] = apart
+    x = np.column_stack([random.uniform(-0.9, 0.9, (4000, 2)), random.uniform(0.01, 0.03, 4000)])
+    surface = fit(points, np.tile(UP, (3000, 1)))
+    for shift, side in ((0.0, -1), (apart, 1)):
+        found = surface.project(x * [1, 1, side] + shift * UP)
+        assert np.abs(found.distance - x[:, 2]).mean() < 0.1 * apart
 
 
 @pytest.mark.parametrize(("points", "normals", "true"), SHAPES.values(), ids=SHAPES.keys())

@@ -80,6 +80,13 @@ def test_quads_that_are_not_to_be_are_triangles():
     assert found.triangles.tolist() == [[0, 1, 4], [0, 4, 3], [2, 6, 5]]
 
 
+def test_joined_meshes_keep_faces_and_quads():
+    found = STRIP.joined(TETRAHEDRON).joined(STRIP)
+    assert found.quads.tolist() == [[0, 1, 4, 3], [1, 2, 5, 4], [11, 12, 15, 14], [12, 13, 16, 15]]
+    assert found.triangles.tolist() == [[2, 6, 5], *(TETRAHEDRON.faces + 7).tolist(), [13, 17, 16]]
+    np.testing.assert_array_equal(found.vertices[7:11], TETRAHEDRON.vertices)
+
+
 @pytest.mark.parametrize("corners", [3, 4])
 def test_edge_numbers_are_those_of_the_edges(corners):
     faces = np.array([np.random.default_rng(k).permutation(12)[:corners] for k in range(20)])

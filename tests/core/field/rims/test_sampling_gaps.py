@@ -22,7 +22,8 @@ def rims_of(points, normals):
 
 def before_and_after(points, normals, bend_times=1.0):
     rims, cloud = rims_of(points, normals)
-    return rims, with_sampling_gaps_bridged(rims, cloud, bend_times * bending(cloud), 3.0), cloud.spacing
+    bend = bend_times * bending(cloud, np.full(len(points), np.inf))
+    return rims, with_sampling_gaps_bridged(rims, cloud, bend, 3.0), cloud.spacing
 
 
 def with_and_without_openings_kept(points, normals):
