@@ -98,24 +98,23 @@ def case(gui):
     with gui.override():
         bpy.ops.vad.reconstruct("INVOKE_DEFAULT")
     yield from gui.until(lambda: not job.running())
-    size = len(made["surface"].data.vertices)
+    triangles = len(made["surface"].data.polygons)
     with gui.override():
         started = time.monotonic()
-        assert bpy.ops.vad.reextract("INVOKE_DEFAULT", True, offset=0.7) == {"FINISHED"}
+        assert bpy.ops.vad.reextract("INVOKE_DEFAULT", True, faces="quads") == {"FINISHED"}
         print(f"from the field as it is: {time.monotonic() - started:.2f} s")
-    assert len(made["surface"].data.vertices) != size
-    size = len(made["surface"].data.vertices)
+    assert 0.4 < len(made["surface"].data.polygons) / triangles < 0.7
     yield 0.3
     operator = last("VAD_OT_reextract")
-    adjust(operator, offset=1.5)
+    adjust(operator, faces="triangles")
     yield 0.3
     made = {obj["vad_role"]: obj for obj in bpy.context.scene.vad.result.objects}
-    adjusted = len(made["surface"].data.vertices)
-    assert adjusted != size
+    adjusted = len(made["surface"].data.polygons)
+    assert 0.95 < adjusted / triangles < 1.05
     adjust(operator, surface="single")
     yield 0.3
     made = {obj["vad_role"]: obj for obj in bpy.context.scene.vad.result.objects}
-    assert len(made["surface"].data.vertices) == adjusted
+    assert len(made["surface"].data.polygons) == adjusted
     gui.shot("6_adjusted")
 
     # Many points go through the worker, which Esc stops; the redo panel would freeze the window.
