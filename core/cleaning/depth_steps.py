@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import shortened
+from ..neighbourhoods.quadrics import fit_quadrics
 from ..progress import Progress
-from .quadrics import fit_quadrics
 
 _LEVELS, _ON_EACH = 16, 16  # distinct depths, and samples at each of them on average, at least
 _EVEN, _EVENER = 0.1, 0.5  # median deviation of gaps between disparities from their median, and of that for depths

@@ -5,11 +5,11 @@ from functools import partial
 
 import numpy as np
 
+from ..neighbourhoods.clusters import Clusters
+from ..neighbourhoods.quadrics import fit_quadrics, nested_quadrics
 from ..parallel import in_order
 from ..progress import Progress
 from .anchors import SMOOTHING, nearest_anchor, spread_anchors
-from .clusters import Clusters
-from .quadrics import fit_quadrics, nested_quadrics
 
 LADDER = (12, 20, 32, 50, 80, 128, 200)  # neighbours tried
 _WIDER = (320, 500, 800, 1250, 2000, 3200, 5000, 8000, 12500, 20000)  # tried one by one, where noise asks for more

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..given_arrays import finite_points
+from ..neighbourhoods.quadrics import fit_quadrics
 from ..progress import Progress
 from .detached import detached_clouds
 from .off_wires import off_wires
-from .quadrics import fit_quadrics
 from .surroundings import SHEET, Surroundings, thickness
 
 MINIMUM_SAMPLES = 100  # fewer leave nothing to compare a sample with

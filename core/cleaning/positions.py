@@ -8,12 +8,12 @@ import numpy as np
 
 from ..given_arrays import finite_points, spacing_of
 from ..linalg import shortened
+from ..neighbourhoods.clusters import Clusters
+from ..neighbourhoods.quadrics import fit_quadrics
 from ..progress import Progress
 from ..settings import Settings
-from .clusters import Clusters
 from .noise import noisy_samples
 from .noise_level import LADDER, estimate_noise
-from .quadrics import fit_quadrics
 
 LONGEST_MOVE = 4.0  # standard deviations of the noise
 

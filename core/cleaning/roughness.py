@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..neighbourhoods.quadrics import GAUSS, nested_quadrics
 from ..progress import Progress
 from .anchors import REGION, spread_anchors
-from .quadrics import GAUSS, nested_quadrics
 
 _FEW, _MORE, _MANY = 12, 20, 32  # neighbours
 _EVERYWHERE = 0.04  # local spacings: nine tenths of the regions of a noisy cloud are above it

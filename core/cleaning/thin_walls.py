@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import outer, principal_axes
-from .quadrics import nested_residuals
+from ..neighbourhoods.quadrics import nested_residuals
 
 _SIZES = 32, 64, 128, 256  # neighbours: more than that see where walls end
 _TWO = 1.6  # kurtosis below which samples are on two sheets; uniform noise leaves 1.8

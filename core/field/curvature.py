@@ -3,10 +3,10 @@
 import numpy as np
 
 from ..linalg import dots, row_dots, solve_positive
+from ..neighbourhoods.close_sheets import off_sheets
+from ..neighbourhoods.cloud import Cloud
 from ..parallel import work_through
 from ..progress import Progress
-from .close_sheets import off_sheets
-from .cloud import Cloud
 
 _WIDTH = 1.2  # of the Gaussian weight, local spacings
 _ONE_SHEET = 16.0  # how fast samples off each other's plane stop counting

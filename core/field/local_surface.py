@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import COMPONENTS
+from ..neighbourhoods.close_sheets import sheet_room
+from ..neighbourhoods.cloud import Cloud
 from ..progress import Progress
-from .close_sheets import sheet_room
-from .cloud import Cloud
 from .curvature import bending
 from .grid import Grid
 from .patches import Patches

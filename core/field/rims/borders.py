@@ -17,9 +17,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ...linalg import row_dots
+from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
-from ..cloud import Cloud
 from ..curvature import sag
 from .walls import walled
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
-from ..cloud import Cloud
 from .borders import Rims, across_gaps, bridged_reach
 
 _FURTHER = 5.0  # times the bridging length, that gaps between lines are bridged, in the median spacing around

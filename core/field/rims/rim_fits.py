@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..cloud import Cloud
+from ...neighbourhoods.cloud import Cloud
 from .borders import one_sheet
 
 _CONE, _LIFT = 0.8, 0.2  # samples steeper than this above a sample, and further, are across a bay

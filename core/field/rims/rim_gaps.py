@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...linalg import row_dots
+from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
-from ..cloud import Cloud
 from .borders import one_sheet
 from .rim_fits import Beside, beside, lowest_lines
 from .sampling_gaps import largest_empty_area

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...linalg import row_dots
+from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
-from ..cloud import Cloud
 from .borders import RIM, Rims, chains, one_sheet
 from .rim_fits import beside, lowest_lines
 from .rim_gaps import RimGaps, find_rim_gaps, spacing_around

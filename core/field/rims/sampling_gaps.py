@@ -19,9 +19,9 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...linalg import row_dots
+from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
-from ..cloud import Cloud
 from ..curvature import sag
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
 from .walls import walled

@@ -7,7 +7,7 @@ gaps between samples. But there the surface goes on down the sides of the hole: 
 import numpy as np
 
 from ...linalg import row_dots
-from ..cloud import Cloud
+from ...neighbourhoods.cloud import Cloud
 
 _STEEP = 0.6  # largest |n_i . n_j| of a wall's samples
 _FACING = 0.5  # least cosine between their normals and the way across

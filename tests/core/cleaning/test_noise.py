@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from core.cleaning.noise import looks_noisy, noisy_samples
 from core.cleaning.noise_level import LADDER, estimate_noise, in_full
-from core.cleaning.quadrics import fit_quadrics
+from core.neighbourhoods.quadrics import fit_quadrics
 from core.points import local_spacing
 from tests import shapes
 

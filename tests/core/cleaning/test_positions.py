@@ -4,7 +4,7 @@ import pytest
 from core import Cancelled
 from core.cleaning.noise_level import estimate_noise
 from core.cleaning.positions import LONGEST_MOVE, denoise
-from core.cleaning.quadrics import fit_quadrics
+from core.neighbourhoods.quadrics import fit_quadrics
 from core.points import local_spacing
 from tests import shapes
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from core.field.cloud import Cloud
 from core.field.curvature import _ALIGNED, _ONE_SHEET, _STIFFNESS, _WIDTH, bending
+from core.neighbourhoods.cloud import Cloud
 from core.points import local_spacing
 from tests import shapes
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from core.field.cloud import Cloud
 from core.field.patches import Patches
 from core.field.rims.borders import DISC, find_rims
+from core.neighbourhoods.cloud import Cloud
 from core.points import local_spacing
 from tests import shapes
 

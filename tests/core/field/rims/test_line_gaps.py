@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.field.cloud import Cloud
 from core.field.patches import Patches
 from core.field.rims import line_gaps
 from core.field.rims.borders import find_rims
 from core.field.rims.line_gaps import with_line_gaps_bridged
+from core.neighbourhoods.cloud import Cloud
 from core.points import local_spacing
 from tests import shapes
 

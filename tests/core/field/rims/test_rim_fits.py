@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from core.field.cloud import Cloud
 from core.field.rims.rim_fits import beside, lowest_lines
+from core.neighbourhoods.cloud import Cloud
 
 
 def test_the_lowest_line_is_the_upper_hull(random):

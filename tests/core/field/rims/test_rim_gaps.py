@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.field.cloud import Cloud
 from core.field.local_surface import fit_local_surface
 from core.field.rims import rim_lines
 from core.field.rims.rim_gaps import RimGaps, find_rim_gaps, spacing_around
+from core.neighbourhoods.cloud import Cloud
 from core.points import local_spacing
 from tests import shapes
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.field.cloud import Cloud
 from core.field.local_surface import fit_local_surface
 from core.field.rims.borders import RIM, chains, find_rims
 from core.field.rims.rim_lines import _at_rims, with_rim_lines
+from core.neighbourhoods.cloud import Cloud
 from core.points import local_spacing
 from tests import shapes
 

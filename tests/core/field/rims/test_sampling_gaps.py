@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from core.field.cloud import Cloud
 from core.field.curvature import bending
 from core.field.local_surface import fit_local_surface
 from core.field.rims import borders, sampling_gaps
 from core.field.rims.borders import find_rims
 from core.field.rims.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
+from core.neighbourhoods.cloud import Cloud
 from core.points import local_spacing
 from tests import shapes
 

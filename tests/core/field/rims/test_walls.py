@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from core.field.cloud import Cloud
 from core.field.rims.walls import walled
+from core.neighbourhoods.cloud import Cloud
 from tests.core.field.rims.test_sampling_gaps import UP, before_and_after, rims_of
 
 SLOT = 0.08  # its width, 2 local spacings

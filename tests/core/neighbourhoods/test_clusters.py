@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.cleaning.clusters import Clusters
+from core.neighbourhoods.clusters import Clusters
 from tests import shapes
 
 

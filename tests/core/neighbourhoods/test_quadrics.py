@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.cleaning.quadrics import fit_quadrics, nested_quadrics, nested_residuals
+from core.neighbourhoods.quadrics import fit_quadrics, nested_quadrics, nested_residuals
 from tests import shapes
 
 

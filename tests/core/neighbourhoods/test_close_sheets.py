@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from core.field.close_sheets import sheet_room
-from core.field.cloud import Cloud
+from core.neighbourhoods.close_sheets import sheet_room
+from core.neighbourhoods.cloud import Cloud
 from core.normals.estimate import estimate_normals
 from core.points import local_spacing
 from tests import shapes

@@ -1,0 +1,7 @@
+"""What the nearest samples of each sample say about the surface around it, with normals and without.
+
+cloud        : samples with normals, and those around each
+close_sheets : how far the sheet beside a sample's own is
+quadrics     : quadrics through neighbours, and how these stand off them
+clusters     : small groups of samples whose means stand for them where neighbourhoods are wide
+"""
