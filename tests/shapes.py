@@ -94,6 +94,15 @@ def sheets(n: int, gap: float) -> np.ndarray:
     return np.concatenate([square(n // 2) - half, square(n // 2)[:, [1, 0, 2]] + half])
 
 
+def scattered_tube(n: int, wall: float) -> np.ndarray:
+    """Random samples of a closed tube of outer radius .5 and height 1 with walls so thick, turned at random."""
+    rng = np.random.default_rng(0)
+    areas = np.array([1.0, 2 * (0.5 - wall), *[0.5**2 - (0.5 - wall) ** 2] * 2])
+    face, turn, across = rng.choice(4, n, p=areas / areas.sum()), *rng.random((2, n))
+    out = np.choose(face, [0.5, 0.5 - wall, *[np.sqrt((0.5 - wall) ** 2 + across * areas[2])] * 2])
+    return _around(out, turn, np.choose(face, [across, across, 0, 1])) @ random_rotation(1).T
+
+
 def sphere_distance(x: np.ndarray, radius: float = 1.0) -> np.ndarray:
     return np.abs(np.linalg.norm(x, axis=1) - radius)
 

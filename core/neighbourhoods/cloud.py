@@ -1,6 +1,6 @@
 """The samples with their normals, and those around each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -37,6 +37,10 @@ class Cloud:
         for part in Progress.of(progress).chunks(tree.n, _CHUNK):
             neighbours[part] = tree.query(tree.data[part], k=k, workers=-1)[1][:, 1:]
         return cls(points, normals, spacing, tangent_frames(normals), neighbours, tree)
+
+    def turned(self, normals: np.ndarray) -> "Cloud":
+        """The same with other normals (n,3)."""
+        return replace(self, normals=normals, frames=tangent_frames(normals))
 
     def __len__(self) -> int:
         return len(self.points)

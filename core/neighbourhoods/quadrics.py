@@ -39,12 +39,14 @@ class Quadrics:
 
     step     : (m,3) float64, from the sample onto the quadric
     height   : (m,) float64, length of that step
+    normal   : (m,3) float64, unit normal of the quadric over the sample
     leverage : (m,) float64 in [0,1), share of its own position in the quadric's height at the sample
     radius   : (m,) float64, distance to the farthest of the neighbours
     """
 
     step: np.ndarray
     height: np.ndarray
+    normal: np.ndarray
     leverage: np.ndarray
     radius: np.ndarray
 
@@ -133,8 +135,9 @@ def _quadrics(offset, distance):
     squared = row_dots(upright, upright)
     step = (coefficients[:, 0] / squared)[:, None] * upright
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
-    height = np.abs(coefficients[:, 0]) / np.sqrt(squared)
-    return Quadrics(step, height, np.minimum(leverage, 0.95), radius[:, 0])
+    steep = np.sqrt(squared)
+    height, normal = np.abs(coefficients[:, 0]) / steep, upright / steep[:, None]
+    return Quadrics(step, height, normal, np.minimum(leverage, 0.95), radius[:, 0])
 
 
 def _residuals(offset, distance):

@@ -1,6 +1,7 @@
 """Stage one, from points to bi-directional normals with their confidence, in the way asked of :mod:`.estimate`.
 
 mirrors, reflection            : by reflection across the bisectors of the samples
+walls                          : told apart where sheets run side by side
 planes, shared_planes, creases : told apart where sheets meet at an angle
 energy, energy_torch, adam     : the paper's own way, by minimising its energy
 pca, known                     : fits of planes alone, the baseline; normals that are given

@@ -18,7 +18,7 @@ from ..linalg import row_dots
 from ..progress import Progress
 from .mirrors import Mirrors
 from .planes import neighbourhoods, onto_planes
-from .reflection import sweep_once
+from .reflection import sweeps_over
 from .shared_planes import onto_shared_planes
 
 _ALIKE = 0.06  # of the Gaussian of the sine between axes of one sheet
@@ -45,24 +45,24 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     progress(0.0)
     fixed = np.isin(np.arange(len(points)), fixed)
     moved, held = np.zeros(len(points), bool), fixed
-    agreed, suspect = _agreed(mirrors, normals, held)
+    agreed, suspect = agreed_share(mirrors, normals, held)
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            normals, flat = onto_planes(points, spacing, tree, normals, _agreed(here, normals, fixed)[1])
+            normals, flat = onto_planes(points, spacing, tree, normals, agreed_share(here, normals, fixed)[1])
             normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)
             if not (flat | bent).any():
                 break
             moved = moved | flat | bent
             beside = mirrors.and_around(mirrors.and_around(moved))
-            normals = _settled(_parted(mirrors, normals, moved), normals, beside & ~held)
+            normals = sweeps_over(_parted(mirrors, normals, moved), normals, beside & ~held, _SWEEPS)
             normals, shared = onto_shared_planes(points, spacing, tree, mirrors, normals, ~fixed)
             held, moved = held | shared, moved | shared
     parted = _parted(mirrors, normals, moved) if moved.any() else mirrors
     return normals, parted.confidence(normals), moved
 
 
-def _agreed(mirrors, normals, held):
+def agreed_share(mirrors, normals, held):
     """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
     agreed = mirrors.gather @ _alike(mirrors.cosines(normals))
     rise = mirrors.gather @ np.abs(mirrors.rises(normals))
@@ -75,7 +75,7 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress
     normals, moved, here = normals.copy(), np.zeros(len(points), bool), np.unique(mirrors.site)
     changed = ~moved
     for _ in range(_ROUNDS):
-        found, suspect = _agreed(mirrors, normals, held)
+        found, suspect = agreed_share(mirrors, normals, held)
         agreed[here] = found[here]
         row = np.flatnonzero(suspect & mirrors.and_around(mirrors.and_around(changed)))
         axes = np.empty((len(row), 3))
@@ -100,14 +100,6 @@ def _parted(mirrors, normals, moved):
 def _across(mirrors, normals):
     """Which neighbours, (p,) bool, have axes unlike those that the samples expect, or rise far out of their plane."""
     return (1 - mirrors.cosines(normals) ** 2 > _ACROSS**2) | (np.abs(mirrors.rises(normals)) > _RISEN)
-
-
-def _settled(mirrors, normals, rows):
-    """The axes after sweeps over `rows` (n,) bool alone."""
-    normals, here = normals.copy(), mirrors.at(rows)
-    for _ in range(_SWEEPS):
-        normals[rows] = sweep_once(here, normals, 1, rows)
-    return normals
 
 
 def _densest(row, points, spacing, tree, normals, agreed):

@@ -21,6 +21,7 @@ from .known import unit_axes
 from .mirrors import Mirrors
 from .pca import pca_normals
 from .reflection import reflection_sweeps
+from .walls import normals_of_walls
 
 _SAME_AXIS = 1 - 1e-9  # least |a . b| of unit axes that one row may be given
 
@@ -52,8 +53,9 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
         return _least_energy(points, spacing, settings, constraints, progress)
     facets = voronoi_facets(points, spacing, settings.seed, progress.part(0.0, 0.7))
     mirrors = Mirrors(points, spacing, facets, progress.part(0.7, 0.75))
-    normals, sweeps = reflection_sweeps(mirrors, constraints, progress=progress.part(0.75, 0.9))
+    normals, sweeps = reflection_sweeps(mirrors, constraints, progress=progress.part(0.75, 0.85))
     fixed = () if constraints is None else constraints[0]
+    normals, mirrors = normals_of_walls(points, spacing, mirrors, normals, fixed, progress.part(0.85, 0.9))
     normals, confidence, beside = normals_of_sheets(points, spacing, mirrors, normals, fixed, progress.part(0.9, 1.0))
     report = {"facets": len(facets.pairs), "sweeps": sweeps, "beside_creases": int(beside.sum())}
     return normals, confidence, report

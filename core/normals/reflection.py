@@ -66,3 +66,11 @@ def sweep_once(mirrors: Mirrors, normals: np.ndarray, sweep: int, rows=slice(Non
     inertia = _INERTIA if sweep > _FREE_SWEEPS else 0.0
     tensors = mirrors.agreement(normals) - mirrors.alignment + inertia * outer(normals)
     return principal_axes(tensors[rows])
+
+
+def sweeps_over(mirrors: Mirrors, normals: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+    """The axes (n,3) after so many sweeps over samples `rows` (n,) bool alone."""
+    normals, here = normals.copy(), mirrors.at(rows)
+    for _ in range(count):
+        normals[rows] = sweep_once(here, normals, 1, rows)
+    return normals

@@ -20,6 +20,14 @@ def test_a_sample_lifted_off_a_quadric_falls_back_onto_it():
     assert fit_quadrics(points, np.arange(len(points)), 40).height.max() < 2e-3
 
 
+def test_normals_are_those_of_the_quadric_even_where_neighbours_are_on_one_side():
+    points = shapes.hemisphere(2000)
+    rim = np.flatnonzero(points[:, 2] < 0.01)
+    fit = fit_quadrics(points, rim, 40)
+    np.testing.assert_allclose(np.linalg.norm(fit.normal, axis=1), 1)
+    assert np.abs(np.einsum("ni,ni->n", fit.normal, points[rim])).min() > np.cos(0.02)
+
+
 def test_one_stray_does_not_bend_the_others():
     points = np.vstack([shapes.square(400), [[0.01, 0.01, 0.3]]])
     near = np.flatnonzero(np.linalg.norm(points[:400], axis=1) < 0.5)
@@ -54,6 +62,7 @@ def test_a_quadric_through_its_own_points_is_found_exactly():
     points = np.column_stack([x, y, 0.3 * x * x + 0.2 * x * y - 0.25 * y * y]) @ turn.T
     fit = fit_quadrics(points, np.array([60]), 121)  # the middle one, where the tangent plane is that of the axes
     assert fit.height[0] < 1e-6 < 1e-3 < np.abs(points @ turn[:, 2]).max()
+    np.testing.assert_allclose(np.abs(fit.normal[0] @ turn), [0, 0, 1], atol=1e-6)
     slid = points + 0.1 * turn[:, 2] * (np.arange(121) == 60)[:, None]
     np.testing.assert_allclose(fit_quadrics(slid, np.array([60]), 121).step[0], -0.1 * turn[:, 2], atol=0.01)
 

@@ -412,21 +412,10 @@ def test_sheets_that_meet_others_are_sharp_where_they_fold(seed):
     assert (off > 0.1 * cell).mean() < 0.03
 
 
-def tube(count, wall, radius=0.5, height=1.0):
-    """Random samples of a closed tube with walls so thick."""
-    rng = np.random.default_rng(0)
-    areas = np.array([2 * radius * height, 2 * (radius - wall) * height, *[radius**2 - (radius - wall) ** 2] * 2])
-    face, turn, across = rng.choice(4, count, p=areas / areas.sum()), *rng.random((2, count))
-    out = np.choose(face, [radius, radius - wall, *[np.sqrt((radius - wall) ** 2 + across * areas[2])] * 2])
-    z = height * np.choose(face, [across, across, 0, 1])
-    turn *= 2 * np.pi
-    return np.column_stack([out * np.cos(turn), out * np.sin(turn), z]) @ shapes.random_rotation(1).T
-
-
 @pytest.mark.parametrize("kind", ["single", "signed"])
 def test_thin_walls_have_no_holes(kind):
     """Walls .96 cells thick, in which so few nodes lie that the zero set of signed distances had five holes."""
-    run = single(tube(12_000, 0.04), resolution=40, surface=kind, denoise=0)
+    run = single(shapes.scattered_tube(12_000, 0.04), resolution=40, surface=kind, denoise=0)
     mesh = run.sheet if kind == "single" else run.surface
     assert 0.9 < 0.04 / run.report["grid"]["cell"] < 1
     assert (mesh.edge_counts()[1] == 2).all()
@@ -438,5 +427,5 @@ def test_thin_walls_have_no_holes(kind):
 def test_what_is_around_walls_is_taken_only_if_it_is_closer(monkeypatch):
     """Were it farther off than what has the holes, these would stay."""
     monkeypatch.setattr(single_layer, "chamfer", lambda *given: -misfit.chamfer(*given))
-    run = single(tube(12_000, 0.04), resolution=40, denoise=0)
+    run = single(shapes.scattered_tube(12_000, 0.04), resolution=40, denoise=0)
     assert shapes.euler(run.sheet) < 0

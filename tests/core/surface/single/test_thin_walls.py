@@ -12,24 +12,13 @@ from tests import shapes
 WALL = 0.025
 
 
-def tube(count, radius=0.5, height=1.0):
-    """Random samples of a closed tube."""
-    rng = np.random.default_rng(0)
-    areas = np.array([2 * radius * height, 2 * (radius - WALL) * height, *[radius**2 - (radius - WALL) ** 2] * 2])
-    face, turn, across = rng.choice(4, count, p=areas / areas.sum()), *rng.random((2, count))
-    out = np.choose(face, [radius, radius - WALL, *[np.sqrt((radius - WALL) ** 2 + across * areas[2])] * 2])
-    z = height * np.choose(face, [across, across, 0, 1])
-    turn *= 2 * np.pi
-    return np.column_stack([out * np.cos(turn), out * np.sin(turn), z]) @ shapes.random_rotation(1).T
-
-
 def run(points, **settings):
     return reconstruct(points, Settings(resolution=40, surface="both", **settings))
 
 
 def tube_and_disc():
     """A tube with walls of .46 cells, and a disc over it."""
-    return np.concatenate([tube(12_000), 0.5 * shapes.disc(1500) + [0, 0, 1.5]])
+    return np.concatenate([shapes.scattered_tube(12_000, WALL), 0.5 * shapes.disc(1500) + [0, 0, 1.5]])
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +48,7 @@ def test_a_ball_pressed_flat_is_one_wall():
 
 
 def test_quads_stay_quads():
-    sheet = run(tube(12_000), faces="quads").sheet
+    sheet = run(shapes.scattered_tube(12_000, WALL), faces="quads").sheet
     assert sheet.pairs > 0.4 * len(sheet.faces)
     np.testing.assert_array_equal(sheet.faces[: sheet.pairs, 0], sheet.faces[sheet.pairs : 2 * sheet.pairs, 0])
     assert shapes.euler(sheet) == 0
