@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from core import points as core_points
-from core.cleaning import outliers, quadrics, surroundings
+from core.cleaning import outliers, surroundings
 from core.cleaning.positions import denoise
-from core.field import cloud, curvature, local_surface
+from core.field import curvature, local_surface
 from core.field.rims import borders
+from core.neighbourhoods import cloud, quadrics
 from core.points import local_spacing
 from tests import shapes
 
