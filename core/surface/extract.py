@@ -14,23 +14,15 @@ from ..settings import Settings
 from .double.both_sides import both_sides
 from .double.double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
 from .double.ridges import ridge_share
-from .edges.crossings import Crossings, find_crossings
-from .edges.meetings import Meetings, find_meetings
+from .edges.meetings import Meetings
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
 from .meshing.misfit import OFF, chamfer, misfit
 from .meshing.pieces import pieces_touch, pieces_with_samples, without_small_pieces
 from .signed import signed_distance
-from .signs.sides import Sides, find_sides, may_be_closed, needed_band
-from .single.single_layer import (
-    BETTER,
-    ROUGH,
-    boundary_of_inside,
-    sheet_between_sides,
-    sheet_of_crossings,
-    sheet_of_sides,
-)
-from .single.thin_walls import with_thin_walls
+from .signs.sides import may_be_closed, needed_band
+from .single.layer import SingleLayer
+from .single.single_layer import BETTER, ROUGH, boundary_of_inside
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
@@ -85,71 +77,25 @@ class _Layers:
     progress: Progress
 
     @cached_property
-    def meetings(self) -> Meetings:
-        return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"))
-
-    @cached_property
-    def crossings(self) -> Crossings:
-        part = self.progress.part(0.05, 0.2, "crossings")
-        return find_crossings(self.band, self.local, self.grid, part, self.meetings)
-
-    @cached_property
-    def sides(self) -> Sides:
-        part = self.progress.part(0.2, 0.3, "crossings")
-        return find_sides(self.values, self.crossings, self.local, self.grid, part)
-
-    @cached_property
-    def between(self) -> Mesh | None:
-        """What lies between the two sides of a surface that bounds no inside."""
-        part = self.progress.part(0.3, 0.5, "single layer")
-        given = self.values, self.band, self.crossings, self.sides, self.local, self.grid
-        return sheet_between_sides(*given, part)
-
-    @cached_property
-    def sheet(self) -> Mesh | None:
-        """The single layer of a surface with two sides."""
-        part = self.progress.part(0.3, 0.5, "single layer")
-        given = self.values, self.crossings, self.sides, self.local, self.grid, self.between
-        return sheet_of_sides(*given, lambda: self.extracted, part)
-
-    @cached_property
-    def single(self) -> tuple[Mesh, int]:
-        """The single layer of any surface, and the number of its edges that cannot be wound alike."""
-        if self.sheet is not None:
-            return self.sheet, 0
-        part = self.progress.part(0.5, 0.7, "single layer")
-        given = self.values, self.band, self.crossings, self.local, self.grid, self.between
-        return sheet_of_crossings(*given, lambda: self.extracted, part)
-
-    @cached_property
-    def walled(self) -> tuple[Mesh, int]:
-        """The same, with pieces of the double cover around thin walls, where it is rough and has no two sides;
-        see :func:`with_thin_walls`."""
-        if self.sheet is not None or not self.meetings.side_by_side or self.fit[0] <= ROUGH:
-            return self.single
-        return with_thin_walls(*self.single, self.extracted, self.local, self.grid.spacing)
-
-    @cached_property
-    def single_fit(self) -> tuple[float, float]:
-        """:func:`misfit` of the single layer."""
-        return misfit(self.single[0], self.local, self.grid.spacing)
+    def single(self) -> SingleLayer:
+        return SingleLayer(self.values, self.band, self.local, self.grid, lambda: self.extracted, self.progress)
 
     @property
-    def fit(self) -> tuple[float, float]:
-        """The same, but 0 where it bounds the inside and no sheets run side by side, as in thin walls."""
-        plain = self.sides.complete and not self.meetings.side_by_side
-        return (0.0, 0.0) if plain else self.single_fit
+    def meetings(self) -> Meetings:
+        return self.single.meetings
 
     @cached_property
-    def walled_fit(self) -> tuple[float, float]:
-        """The same of the single layer with thin walls."""
-        same = self.walled[0] is self.single[0]
-        return self.fit if same else misfit(self.walled[0], self.local, self.grid.spacing)
+    def best_single(self) -> tuple[Mesh, int, tuple[float, float]]:
+        """The single layer for users, the number of its edges that cannot be wound alike, and :func:`misfit` of it."""
+        found = self.single.told_apart()
+        sheet, unoriented = found.with_thin_walls()
+        fit = found.fit if sheet is found.sheet[0] else misfit(sheet, self.local, self.grid.spacing)
+        return sheet, unoriented, fit
 
     @property
     def is_cover_better(self) -> bool:
         """Whether the single layer is torn, and the double cover is not."""
-        worst = self.walled_fit[0]
+        worst = self.best_single[2][0]
         return worst > 1 and self.cover_fit[0] < BETTER * worst
 
     @cached_property
@@ -162,7 +108,7 @@ class _Layers:
         """:func:`misfit` of the double cover."""
         if not self.is_of_sheet:
             return self.extracted_fit
-        return misfit(self.cover, self.local, self.grid.spacing) if self.meetings.side_by_side else self.fit
+        return misfit(self.cover, self.local, self.grid.spacing) if self.meetings.side_by_side else self.single.fit
 
     @cached_property
     def is_of_sheet(self) -> bool:
@@ -170,7 +116,7 @@ class _Layers:
         nor even rough where sheets run side by side, and in doubt where they are closer to it than the cover extracted.
         """
         looked = self._may_be_sheet()
-        if looked and self._is_whole() and self.fit[0] <= (ROUGH if self.meetings.side_by_side else 1):
+        if looked and self._is_whole() and self.single.fit[0] <= (ROUGH if self.meetings.side_by_side else 1):
             return True
         return (looked or self._is_rough()) and self._is_closer()
 
@@ -180,7 +126,7 @@ class _Layers:
         if self.local.spacing_in_cells(self.grid) > _SPARSEST:
             return False
         worst = self.extracted_fit[0]
-        return worst > _MERGED or (worst > ROUGH and self.meetings.side_by_side and self.sheet is not None)
+        return worst > _MERGED or (worst > ROUGH and self.meetings.side_by_side and self.single.of_sides is not None)
 
     def _is_closer(self):
         """Whether both sides of the single layer are closer to the surface than the extracted double cover."""
@@ -191,8 +137,10 @@ class _Layers:
     def both_sides(self) -> Mesh:
         """Those of the single layer, without the pockets of a few faces that may be left along the lines where sheets
         meet."""
-        cover = both_sides(self.single[0], self.grid.spacing)
-        return cover if self.sheet is not None else pieces_with_samples(cover, self.local.tree, self.grid.spacing)
+        cover = both_sides(self.single.sheet[0], self.grid.spacing)
+        if self.single.of_sides is not None:
+            return cover
+        return pieces_with_samples(cover, self.local.tree, self.grid.spacing)
 
     @cached_property
     def extracted(self) -> Mesh:
@@ -215,7 +163,7 @@ class _Layers:
         if self.meetings.few:
             return True
         if self.meetings.pass_through:
-            if self.sides.complete:
+            if self.single.sides.complete:
                 return bool(self.meetings.passing.any())
             if self.local.confidence[self.meetings.through].mean() < _CLEAN:
                 return False
@@ -225,9 +173,9 @@ class _Layers:
         """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
         surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
         by side, or if it has none and its borders are elsewhere. Where sheets pass through each other it has lines."""
-        if self.sheet is not None:
-            return self.sides.complete or not self.meetings.pass_through
-        sheet = self.single[0]
+        if self.single.of_sides is not None:
+            return self.single.sides.complete or not self.meetings.pass_through
+        sheet = self.single.sheet[0]
         edges, count = sheet.edge_counts()
         border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
         if len(line):
@@ -235,7 +183,9 @@ class _Layers:
             return shown and not self.meetings.side_by_side
         if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
             return False
-        return not (self.crossings.normal.any() and len(border)) or self._at_meetings(sheet.vertices[border]) <= _SPLIT
+        if not (self.single.crossings.normal.any() and len(border)):
+            return True
+        return self._at_meetings(sheet.vertices[border]) <= _SPLIT
 
     def _at_meetings(self, places):
         """The share of places (m,3), at least one, whose nearest samples are where sheets meet."""
@@ -290,11 +240,11 @@ def extract_surfaces(
         if (missed := layers.cover_fit[1]) > _SOME:
             warnings.append(_said_of_missed(missed, "double cover", "they are merged"))
     if kind in ("single", "both"):
-        meshes["single"], unoriented = layers.walled
+        meshes["single"], unoriented, fit = layers.best_single
         if layers.is_cover_better:
             meshes["single"], unoriented = layers.cover, 0
             warnings.append(_said_of_torn(local, grid))
-        elif (missed := layers.walled_fit[1]) > _SOME:
+        elif (missed := fit[1]) > _SOME:
             other = "" if kind == "both" else ", or use the double cover"
             warnings.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
         if unoriented:
@@ -303,13 +253,14 @@ def extract_surfaces(
                 "there, or sheets meet; use the double cover where both sides must show"
             )
     if kind == "signed":
-        values = signed_distance(values, layers.sides, local, place)
+        sides = layers.single.sides
+        values = signed_distance(values, sides, local, place)
         part = progress.part(0.6, 1.0, "signed surface")
         meshes["signed"] = boundary_of_inside(values, layers.meetings, local, grid, lambda: layers.extracted, part)
-        if not layers.sides.complete:
+        if not sides.complete:
             warnings.append(
-                f"{layers.sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "
-                f"the signed surface has a face on either side; it spans openings of {layers.sides.spanned:.1%} of its "
+                f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "
+                f"the signed surface has a face on either side; it spans openings of {sides.spanned:.1%} of its "
                 "area; compare it with the single layer"
             )
     for kind, mesh in meshes.items():

@@ -70,10 +70,11 @@ class Meetings:
         return some.sum() / max(self.at.sum(), 1)
 
 
-def find_meetings(surface: LocalSurface, progress=None) -> Meetings:
-    """Where sheets meet, cross or run close, from the samples alone."""
+def find_meetings(surface: LocalSurface, progress=None, by_room: bool = False) -> Meetings:
+    """Where sheets meet, cross or run close, from the samples alone. Sheets closer than the samples on each are told
+    apart `by_room` of each sample beside others, too, if asked for; creases may then look like such sheets."""
     progress, n = Progress.of(progress), len(surface.points)
-    nearest, member = _members(surface, min(NEIGHBOURS + 1, n), progress)
+    nearest, member = _members(surface, min(NEIGHBOURS + 1, n), by_room, progress)
     alike = member > MEMBER
     trusted = surface.confidence >= TRUSTED
     unlike = ~alike & trusted[nearest] & trusted[:, None]
@@ -182,19 +183,20 @@ def _followed(own, surface):
     return followed
 
 
-def _members(surface, k, progress):
+def _members(surface, k, by_room, progress):
     """The k samples nearest to each, and how surely each of them lies on one sheet with it, (n,k)."""
     n = len(surface.points)
     nearest, member = np.empty((n, k), np.int64), np.empty((n, k), np.float32)
-    for part, found in in_order(lambda part: _around(part, k, surface), even_chunks(n, _CHUNK, progress)):
+    for part, found in in_order(lambda part: _around(part, k, surface, by_room), even_chunks(n, _CHUNK, progress)):
         nearest[part], member[part] = found[1:]
     return nearest, member
 
 
-def _around(own, k, surface):
+def _around(own, k, surface, by_room=False):
     """Distances to the k samples nearest to some, which they are, and how surely each lies on one sheet, (m,k)."""
     away, near = surface.tree.query(surface.points[own], k=k)
     points, normals = surface.columns.points, surface.normals.T
     between = np.stack([x.take(near) - x[own, None] for x in points])
     own_normals, theirs = normals[:, own, None], np.stack([column.take(near) for column in normals])
-    return away, near, membership(between, dots(between, own_normals), dots(between, theirs))
+    room = surface.room[own, None] if by_room else np.inf
+    return away, near, membership(between, dots(between, own_normals), dots(between, theirs), room)

@@ -9,8 +9,8 @@ from core import Settings, reconstruct
 from core.field.blocks import Blocks
 from core.linalg import symmetric
 from core.progress import Progress
-from core.surface import extract
 from core.surface.signs.two_sides import _orientations, two_sided
+from core.surface.single import layer
 from core.surface.single.single_layer import sheet_between_sides
 from tests import shapes
 
@@ -29,7 +29,7 @@ def asked(monkeypatch):
             seen["signed"] = signed.dense() if isinstance(signed, Blocks) else signed
             return sheet_between_sides(values, band, crossings, sides, *rest)
 
-        monkeypatch.setattr(extract, "sheet_between_sides", look)
+        monkeypatch.setattr(layer, "sheet_between_sides", look)
         reconstruct(points, Settings(**{"resolution": 48, "surface": "single", "denoise": 0, **settings}))
         return seen
 

@@ -1,0 +1,107 @@
+"""The single layer of any surface, and what it is made of."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...field.blocks import Blocks
+from ...field.grid import Grid
+from ...field.local_surface import LocalSurface
+from ...field.steps import NearBand
+from ...progress import Progress
+from ..edges.crossings import Crossings, find_crossings
+from ..edges.meetings import Meetings, find_meetings
+from ..mesh import Mesh
+from ..meshing.misfit import misfit
+from ..signs.sides import Sides, find_sides
+from .single_layer import ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
+from .thin_walls import with_thin_walls
+
+_CLEARER = 1 / 3  # of the misfit of a layer, at most, by one with sheets told apart by their room
+
+
+@dataclass(frozen=True)
+class SingleLayer:
+    """The single layer, and what it is made of, each found when it is first asked for.
+
+    cover   : function that gives the double cover extracted at an offset
+    by_room : whether sheets side by side are told apart by the room that each sample has beside others, too
+    """
+
+    values: np.ndarray | Blocks
+    band: NearBand
+    local: LocalSurface
+    grid: Grid
+    cover: Callable[[], Mesh]
+    progress: Progress
+    by_room: bool = False
+
+    @cached_property
+    def meetings(self) -> Meetings:
+        return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
+
+    @cached_property
+    def crossings(self) -> Crossings:
+        part = self.progress.part(0.05, 0.2, "crossings")
+        return find_crossings(self.band, self.local, self.grid, part, self.meetings)
+
+    @cached_property
+    def sides(self) -> Sides:
+        part = self.progress.part(0.2, 0.3, "crossings")
+        return find_sides(self.values, self.crossings, self.local, self.grid, part)
+
+    @cached_property
+    def between(self) -> Mesh | None:
+        """What lies between the two sides of a surface that bounds no inside."""
+        part = self.progress.part(0.3, 0.5, "single layer")
+        given = self.values, self.band, self.crossings, self.sides, self.local, self.grid
+        return sheet_between_sides(*given, part)
+
+    @cached_property
+    def of_sides(self) -> Mesh | None:
+        """The single layer of a surface with two sides."""
+        part = self.progress.part(0.3, 0.5, "single layer")
+        given = self.values, self.crossings, self.sides, self.local, self.grid, self.between
+        return sheet_of_sides(*given, self.cover, part)
+
+    @cached_property
+    def sheet(self) -> tuple[Mesh, int]:
+        """That of any surface, and the number of its edges that cannot be wound alike."""
+        if self.of_sides is not None:
+            return self.of_sides, 0
+        part = self.progress.part(0.5, 0.7, "single layer")
+        given = self.values, self.band, self.crossings, self.local, self.grid, self.between
+        return sheet_of_crossings(*given, self.cover, part)
+
+    @cached_property
+    def misfit(self) -> tuple[float, float]:
+        """:func:`misfit` of that."""
+        return misfit(self.sheet[0], self.local, self.grid.spacing)
+
+    @property
+    def fit(self) -> tuple[float, float]:
+        """The same, but 0 where it bounds the inside and no sheets run side by side, as in thin walls."""
+        plain = self.sides.complete and not self.meetings.side_by_side
+        return (0.0, 0.0) if plain else self.misfit
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether sheets run side by side, and it goes to and fro between them."""
+        return self.meetings.side_by_side and self.fit[0] > ROUGH
+
+    def told_apart(self) -> "SingleLayer":
+        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so. It may have
+        lines where a crease looks like two sheets."""
+        if not self.is_rough or np.isinf(self.local.room).all():
+            return self
+        other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
+        return other if other.misfit[0] < _CLEARER * self.misfit[0] else self
+
+    def with_thin_walls(self) -> tuple[Mesh, int]:
+        """The single layer, with pieces of the double cover around thin walls where it is rough and has no two sides;
+        see :func:`with_thin_walls`."""
+        if not self.is_rough or self.of_sides is not None:
+            return self.sheet
+        return with_thin_walls(*self.sheet, self.cover(), self.local, self.grid.spacing)
