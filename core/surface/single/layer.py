@@ -16,10 +16,8 @@ from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
 from ..meshing.misfit import misfit
 from ..signs.sides import Sides, find_sides
-from .single_layer import ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
+from .single_layer import BETTER, ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
 from .thin_walls import with_thin_walls
-
-_CLEARER = 1 / 3  # of the misfit of a layer, at most, by one with sheets told apart by their room
 
 
 @dataclass(frozen=True)
@@ -92,12 +90,12 @@ class SingleLayer:
         return self.meetings.side_by_side and self.fit[0] > ROUGH
 
     def told_apart(self) -> "SingleLayer":
-        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so. It may have
-        lines where a crease looks like two sheets."""
-        if not self.is_rough or np.isinf(self.local.room).all():
+        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so. What lies
+        between two sides is no less whole where it is rough, and has no lines, as that may have along creases."""
+        if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
-        return other if other.misfit[0] < _CLEARER * self.misfit[0] else self
+        return other if other.misfit[0] < BETTER * self.misfit[0] else self
 
     def with_thin_walls(self) -> tuple[Mesh, int]:
         """The single layer, with pieces of the double cover around thin walls where it is rough and has no two sides;
