@@ -9,9 +9,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from core.memory import peak_memory_mb
-from core.normals.creases import normals_of_sheets
+from core.normals.estimate import swept_normals
 from core.normals.mirrors import Mirrors
-from core.normals.reflection import reflection_sweeps
 from core.points import local_spacing, prepare_samples
 from core.voronoi.facets import voronoi_facets
 
@@ -61,7 +60,7 @@ def _stage(points, spacing):
         facets = voronoi_facets(points, spacing)
     with Clock() as sweeping:
         mirrors = Mirrors(points, spacing, facets)
-        normals_of_sheets(points, spacing, mirrors, reflection_sweeps(mirrors)[0])
+        swept_normals(points, spacing, mirrors)
     return building, sweeping
 
 

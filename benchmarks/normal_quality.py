@@ -12,9 +12,8 @@ from core import Mesh
 from core.cleaning.clean import clean
 from core.linalg import outer, principal_axes
 from core.normals.adam import MAX_STEPS, minimise
-from core.normals.creases import normals_of_sheets
 from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
-from core.normals.estimate import estimate_normals
+from core.normals.estimate import estimate_normals, swept_normals
 from core.normals.mirrors import Mirrors
 from core.normals.pca import pca_normals
 from core.normals.reflection import reflection_sweeps, sweep_once
@@ -76,8 +75,7 @@ class Problem:
         return NormalEnergy(self.points, self.spacing, self.samples, weights, printed_alignment)
 
     def sweeps(self, start=None) -> np.ndarray:
-        axes, _ = reflection_sweeps(self.mirrors, start=start)
-        return normals_of_sheets(self.points, self.spacing, self.mirrors, axes)[0]
+        return swept_normals(self.points, self.spacing, self.mirrors, start=start)[0]
 
     def adam(self, energy: NormalEnergy, start=None, max_steps=MAX_STEPS) -> np.ndarray:
         """Axes of least energy from the plane fit, or from `start`."""

@@ -64,7 +64,8 @@ Made by `python -m benchmarks.normals FOLDER`, which writes this page, its plots
 Stage one alone: the points of each case go in as they are, no cleaning before and nothing chosen per shape, and what
 comes out is compared with the true normals. NC is |n·n\\*| at the input points.
 
-- *sweeps*: reflection sweeps, with axes beside creases taken to one of the sheets that meet, the default.
+- *sweeps*: reflection sweeps, without neighbours on a sheet close beside a sample's own, with axes beside creases taken
+  to one of the sheets that meet, the default.
 - *best PCA*: plane fit to the k nearest points, with the k of 6 to 24 that has the highest mean NC **on that very
   case**, which nobody can know without the truth.
 - *Open3D*: `estimate_normals` over 30 neighbours.

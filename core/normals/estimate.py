@@ -53,12 +53,18 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
         return _least_energy(points, spacing, settings, constraints, progress)
     facets = voronoi_facets(points, spacing, settings.seed, progress.part(0.0, 0.7))
     mirrors = Mirrors(points, spacing, facets, progress.part(0.7, 0.75))
-    normals, sweeps = reflection_sweeps(mirrors, constraints, progress=progress.part(0.75, 0.85))
+    normals, confidence, report = swept_normals(points, spacing, mirrors, constraints, None, progress.part(0.75, 1.0))
+    return normals, confidence, {"facets": len(facets.pairs), **report}
+
+
+def swept_normals(points, spacing, mirrors: Mirrors, constraints=None, start=None, progress=None):
+    """The same from the `mirrors` of the samples, by sweeps from axes `start` (n,3), or a plane fit for None."""
+    progress = Progress.of(progress)
+    normals, sweeps = reflection_sweeps(mirrors, constraints, start, progress.part(0.0, 0.4))
     fixed = () if constraints is None else constraints[0]
-    normals, mirrors = normals_of_walls(points, spacing, mirrors, normals, fixed, progress.part(0.85, 0.9))
-    normals, confidence, beside = normals_of_sheets(points, spacing, mirrors, normals, fixed, progress.part(0.9, 1.0))
-    report = {"facets": len(facets.pairs), "sweeps": sweeps, "beside_creases": int(beside.sum())}
-    return normals, confidence, report
+    normals, mirrors = normals_of_walls(points, spacing, mirrors, normals, fixed, progress.part(0.4, 0.6))
+    normals, confidence, beside = normals_of_sheets(points, spacing, mirrors, normals, fixed, progress.part(0.6, 1.0))
+    return normals, confidence, {"sweeps": sweeps, "beside_creases": int(beside.sum())}
 
 
 def _least_energy(points, spacing, settings, constraints, progress):
