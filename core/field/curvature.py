@@ -20,9 +20,8 @@ def bending(cloud: Cloud, room, progress=None) -> np.ndarray:
     tangent plane at tangential offset l.
 
     Weighted least squares over the neighbours of each sample on its sheet, which no other is closer to than `room` (n,)
-    float64, each giving its height and, through its normal
-    turned to agree with the sample's, the slope there (three equations each). Curvatures are limited to one per local
-    spacing.
+    float64, each giving its height and, through its normal turned to agree with the sample's, the slope there (three
+    equations each). Curvatures are limited to one per local spacing.
     """
     bend = np.empty((len(cloud), 3, 3))
     columns = np.ascontiguousarray(cloud.points.T), np.ascontiguousarray(cloud.normals.T)

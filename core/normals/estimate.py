@@ -58,7 +58,9 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
 
 
 def swept_normals(points, spacing, mirrors: Mirrors, constraints=None, start=None, progress=None):
-    """The same from the `mirrors` of the samples, by sweeps from axes `start` (n,3), or a plane fit for None."""
+    """The axes (n,3) and confidence (n,) that sweeps over the `mirrors` of the samples (n,3) end with, told apart where
+    sheets run close or meet at an angle, and a dict for the report; constraints as above, `start` (n,3) unit axes to
+    begin with or None for a plane fit."""
     progress = Progress.of(progress)
     normals, sweeps = reflection_sweeps(mirrors, constraints, start, progress.part(0.0, 0.4))
     fixed = () if constraints is None else constraints[0]

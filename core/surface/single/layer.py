@@ -90,8 +90,8 @@ class SingleLayer:
         return self.meetings.side_by_side and self.fit[0] > ROUGH
 
     def told_apart(self) -> "SingleLayer":
-        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so. What lies
-        between two sides is no less whole where it is rough, and has no lines, as that may have along creases."""
+        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so. It never
+        takes the place of what lies between two sides, which has no lines; it may have some, along creases."""
         if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
