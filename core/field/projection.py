@@ -143,12 +143,12 @@ def _project(surface, x, nearest):
     return found
 
 
-def membership(between, height, height_back, room=np.inf) -> np.ndarray:
+def membership(between, height, height_back, room) -> np.ndarray:
     """(m,k) in [0,1]: how surely samples lie on one sheet with another, from how far they are off each other's sheet
     relative to their distance and to the room that it has beside other sheets; keeps close sheets apart.
 
     between : (3,m,k) from the one to the others     height, height_back : (m,k) off its sheet and off theirs
-    room    : (m,1) half the distance from its sheet to another, infinite where it is not given
+    room    : (m,1) half the distance from its sheet to another, or infinite
     """
     squared = height**2 + height_back**2
     off = np.maximum(_MEMBERSHIP * squared / np.maximum(dots(between, between), _TINY), _ROOM * squared / room**2)

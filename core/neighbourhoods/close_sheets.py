@@ -12,7 +12,7 @@ from ..parallel import work_through
 from ..progress import Progress
 from .cloud import Cloud
 
-_PARALLEL = 0.8  # least |n_i . n_j| of samples on sheets side by side
+PARALLEL = 0.8  # least |n_i . n_j| of samples on sheets side by side
 _LEVEL = 0.01  # local spacings, that samples of one sheet may be off each other anyway
 _STEP = 3.0  # times as far as the last of its own sheet is the first of another off a sample, at least
 _FEWEST = 3  # neighbours on either sheet
@@ -47,17 +47,23 @@ def off_sheets(step, agreement, height, theirs):
     return 0.5 * np.abs(height + np.sign(agreement) * dots(step, theirs))
 
 
+def off_neighbours(points, normals, rows, neighbours):
+    """Steps (3,m,k) from some samples to their neighbours (m,k), the cosines between their normals, (m,k), and how far
+    these are off the sheets of those, (m,k); points and normals component by component, (3,n)."""
+    step = [column.take(neighbours) - column[rows, None] for column in points]
+    own, theirs = normals[:, rows, None], [column.take(neighbours) for column in normals]
+    agreement = dots(theirs, own)
+    return step, agreement, off_sheets(step, agreement, dots(step, own), theirs)
+
+
 def _nearest_sheet(points, normals, rows, spacing, neighbours):
     """How far the nearest other sheet is off that of each of some samples, inf where there is none; points and normals
     component by component, (3,n)."""
     if neighbours.shape[1] < 2 * _FEWEST:
         return np.full(len(spacing), np.inf)
-    step = [column.take(neighbours) - column[rows, None] for column in points]
-    own, theirs = normals[:, rows, None], [column.take(neighbours) for column in normals]
-    agreement = dots(theirs, own)
-    off = off_sheets(step, agreement, dots(step, own), theirs)
+    step, agreement, off = off_neighbours(points, normals, rows, neighbours)
     along = np.sqrt(np.maximum(dots(step, step) - off**2, 0))
-    off[np.abs(agreement) < _PARALLEL] = np.inf
+    off[np.abs(agreement) < PARALLEL] = np.inf
 
     order = np.argsort(off, axis=1)
     off, along = np.take_along_axis(off, order, axis=1), np.take_along_axis(along, order, axis=1)

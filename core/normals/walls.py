@@ -14,7 +14,7 @@ The paper has no such step. Where no sheets run close it changes nothing.
 import numpy as np
 
 from ..linalg import dots
-from ..neighbourhoods.close_sheets import off_sheets, sheet_room
+from ..neighbourhoods.close_sheets import PARALLEL, off_neighbours, off_sheets, sheet_room
 from ..neighbourhoods.cloud import Cloud
 from ..neighbourhoods.quadrics import fit_quadrics
 from ..progress import Progress
@@ -24,7 +24,6 @@ from .reflection import sweeps_over
 
 _NEIGHBOURS = 48  # on both sheets
 _ROUNDS, _SWEEPS = 3, 8
-_PARALLEL = 0.8  # least |n_i . n_j| of neighbours that may lie on the sheet across
 _OWN = 6  # neighbours on the sheet of a sample, how far off that they are says how well axes suit
 _WORSE, _BETTER = 1.3, 0.8  # times as far as by the old axes, at most, where sheets were told apart, and beside that
 
@@ -79,15 +78,12 @@ def _across(mirrors, points, normals, room):
     agreement = dots(own, theirs)
     off = off_sheets(step, agreement, dots(step, own), theirs)
     across = np.zeros(len(least), bool)
-    across[asked] = (np.abs(agreement) > _PARALLEL) & (off > least[asked])
+    across[asked] = (np.abs(agreement) > PARALLEL) & (off > least[asked])
     return across
 
 
 def _off_own_sheet(cloud, normals, rows):
     """How far those neighbours of some samples, `rows` (n,) bool, that are least off the sheet of each by axes (n,3)
     are off it, (r,)."""
-    neighbours = cloud.neighbours[rows]
-    step = (cloud.points[neighbours] - cloud.points[rows, None]).transpose(2, 0, 1)
-    own, theirs = normals[rows].T[..., None], normals[neighbours].transpose(2, 0, 1)
-    off = off_sheets(step, dots(theirs, own), dots(step, own), theirs)
+    _, _, off = off_neighbours(cloud.points.T, normals.T, rows, cloud.neighbours[rows])
     return np.sort(off, axis=1)[:, :_OWN].mean(axis=1)
