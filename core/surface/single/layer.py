@@ -11,6 +11,7 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...progress import Progress
+from ..edges.close_walls import beside_within_cells
 from ..edges.crossings import Crossings, find_crossings
 from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
@@ -38,7 +39,8 @@ class SingleLayer:
 
     @cached_property
     def meetings(self) -> Meetings:
-        return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
+        found = find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
+        return found.with_beside(beside_within_cells(self.band, self.local, self.grid))
 
     @cached_property
     def crossings(self) -> Crossings:

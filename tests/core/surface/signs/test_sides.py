@@ -1,5 +1,7 @@
 """Sides of nodes, from exact distances and crossings of balls."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from core.surface.edges.meetings import Meetings
 from core.surface.signs.sides import Sides, _numbered, _sides, find_sides, may_be_closed, patch_lengths
 from tests import shapes
 
-NO_MEETINGS = Meetings(*np.zeros((4, 0), bool))
+NO_MEETINGS = Meetings(*np.zeros((4, 1500), bool))
 GRID = Grid(np.full(3, -1.41), 0.1, (29, 29, 29))
 RADIUS = np.linalg.norm(GRID.positions(np.arange(29**3)), axis=1).reshape(GRID.shape)
 
@@ -107,7 +109,7 @@ def test_an_inner_wall_has_the_inside_on_both_faces(surface):
 def ball_and_square(share):
     """A ball of radius 1/2 below an open square, of which that share of the samples is: distances to both, whether
     nodes lie inside the ball, crossings, how many of them are the square's, and the surface."""
-    count = int(share * 1000)
+    count = int(share * 1500)
     height = GRID.positions(np.arange(29**3)).reshape(*GRID.shape, 3) - [0, 0, 0.96]
     ball = np.linalg.norm(height - [0, 0, -1.46], axis=-1)
     square = np.linalg.norm(np.maximum(np.abs(height) - [0.8, 0.8, 0], 0), axis=-1)
@@ -123,10 +125,10 @@ def ball_and_square(share):
         NO_MEETINGS,
     )
     place = np.random.default_rng(0).uniform([-0.8, -0.8, 0.96], [0.8, 0.8, 0.96], (count, 3))
-    out = shapes.sphere(1000 - count)
+    out = shapes.sphere(1500 - count)
     normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (count, 1)), out])
     points = np.concatenate([place, [0, 0, -0.5] + 0.5 * out])
-    surface = fit_local_surface(points, normals, np.ones(1000), np.full(1000, 0.06), 3.0)
+    surface = fit_local_surface(points, normals, np.ones(1500), np.full(1500, 0.06), 3.0)
     return np.minimum(np.abs(ball - 0.5), square), ball < 0.5, both, len(above), surface
 
 
@@ -151,13 +153,27 @@ def test_walls_so_close_that_no_region_lies_between_may_be_closed(surface):
     assert may_be_closed(np.where(RADIUS > 1, RADIUS - 1, 0.0), surface, GRID)
 
 
-def test_a_speck_is_no_inside(surface):
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.6, 1.0])
+def test_samples_beside_another_sheet_do_not_count_as_having_the_outside_on_both_sides(share):
+    """As those of a wall so thin that hardly a node lies inside."""
+    distance, in_ball, crossings, _, surface = ball_and_square(share)
+    meetings = NO_MEETINGS.with_beside(surface.points[:, 2] > 0.9)
+    sides = find_sides(distance, replace(crossings, meetings=meetings), surface, GRID)
+    np.testing.assert_array_equal(sides.inside, in_ball)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_speck_is_no_inside_but_between_sheets_side_by_side(surface, beside):
     """Crossings around a single node that is far from everything else."""
     inside = RADIUS < 1
     inside[2, 2, 2] = True
     distance = np.abs(RADIUS - 1)
     distance[1:4, 1:4, 1:4] = 0.05
-    np.testing.assert_array_equal(find_sides(distance, crossings_of(inside), surface, GRID).inside, RADIUS < 1)
+    near = np.linalg.norm(surface.points - (GRID.origin + 2 * GRID.spacing), axis=1) < 1.2
+    crossings = replace(crossings_of(inside), meetings=NO_MEETINGS.with_beside(near & beside))
+    np.testing.assert_array_equal(
+        find_sides(distance, crossings, surface, GRID).inside, inside if beside else RADIUS < 1
+    )
 
 
 def test_sides_are_the_least_frustrated_state():

@@ -1,0 +1,44 @@
+"""Closed shapes whose walls are thinner than two cells, with samples far denser than the grid."""
+
+import numpy as np
+import pytest
+
+from core import Settings, reconstruct
+from core.surface.meshing.misfit import distances
+from tests import shapes
+
+
+def signed(points, turn):
+    points = points @ shapes.random_rotation(turn).T
+    return reconstruct(points, Settings(resolution=32, surface="signed", denoise=0))
+
+
+def shelf(thickness):
+    """A block of 1 x 2 x 1 with a plate along the middle of one side that sticks out by 1."""
+    low, high = 0.5, 0.5 + thickness
+    block = [((0, 0, 0), (1, 2, 0)), ((0, 0, 1), (1, 2, 1)), ((0, 0, 0), (0, 2, 1)), ((0, 0, 0), (1, 0, 1))]
+    block += [((0, 2, 0), (1, 2, 1)), ((1, 0, 0), (1, 2, low)), ((1, 0, high), (1, 2, 1))]
+    plate = [((1, 0, low), (2, 2, low)), ((1, 0, high), (2, 2, high)), ((1, 0, low), (2, 0, high))]
+    plate += [((1, 2, low), (2, 2, high)), ((2, 0, low), (2, 2, high))]
+    return shapes.scattered_rectangles(block + plate, 12000)
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+@pytest.mark.parametrize("thickness", [0.06, 0.1, 0.13, 0.16])
+def test_a_plate_of_two_thirds_to_two_cells_is_closed(thickness, turn):
+    """Most were refused: steps of nodes inside and past a wall are alike, and few nodes lie inside of thinner ones."""
+    run = signed(shapes.scattered_box(9000, np.array([2, 2, thickness])), turn)
+    assert 0.5 < thickness / run.field.spacing < 2
+    assert distances(run.surface, run.points).max() < 0.2 * run.field.spacing
+    assert shapes.euler(run.surface) == 2
+    assert shapes.signed_volume(run.surface) == pytest.approx(4 * thickness, rel=0.05)
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+@pytest.mark.parametrize("thickness", [0.03, 0.06])
+def test_a_thin_plate_on_a_thick_block_is_closed(thickness, turn):
+    run = signed(shelf(thickness), turn)
+    assert thickness < 0.8 * run.field.spacing
+    assert distances(run.surface, run.points).max() < 0.7 * run.field.spacing
+    assert shapes.euler(run.surface) == 2
+    assert shapes.signed_volume(run.surface) == pytest.approx(2 + 2 * thickness, rel=0.02)
