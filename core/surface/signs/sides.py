@@ -9,7 +9,7 @@ node minimises the sum of (s_a - s_b)^2 over grid edges that do not cross the su
 that do (the least frustrated state of a signed graph; Kunegis et al., SDM 2010). Farther than 1.5 cells from the
 surface, where it crosses no edge, the nodes of a group of 2^3 share their side. Nested shells so get alternating sides:
 a hollow ball is inside between its walls, and outside within. Where the outside lies on both sides of most samples, as
-around an open sheet, and these are not those of thin walls, no side need be asked: nothing is inside.
+around an open sheet, no side need be asked: nothing is inside.
 """
 
 from collections.abc import Iterable
@@ -36,6 +36,7 @@ _OFF = 0.7  # cells beyond the distance where regions start, at which samples lo
 _ALONE = 1.5  # cells from the surface, where no edge is crossed any more: nodes farther off share their sides
 _OUTSIDE = 0.5  # share of the samples with the outside on both sides, above which nothing is inside
 _SPECK = 27  # nodes
+_HELD = 0.1  # of the nodes on one side, those of specks between sheets side by side, at most; more make no side
 _TOLERANCE, _STEPS = 1e-2, 1000
 _ADJACENT = 1.8  # cells, edges of one patch
 _OPEN = 0.05  # share of crossings, or of samples, with one side at both ends that a closed shape may have
@@ -97,12 +98,12 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     :func:`needed_band`, and the crossed grid edges.
 
     Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges. Of a surface with the
-    outside on both sides of most samples, without others side by side, every crossing has one side at both ends.
+    outside on both sides of most samples every crossing has one side at both ends.
     """
     progress = Progress.of(progress)
     near, labels, count = _far_regions(values, surface, grid)
     outside = _outside(labels)
-    if _is_open(labels, crossings.meetings.beside, surface, grid):
+    if _is_open(labels, surface, grid):
         low, axis = np.divmod(crossings.changing_sides, 3)
         edges = [_Edges(low[axis == a], a, np.ones((axis == a).sum(), bool), grid) for a in range(3)]
         return _judged(each(np.zeros_like, near), edges)
@@ -141,9 +142,8 @@ def _outside(labels):
     return int(at_nodes(labels, np.array([0]))[0])
 
 
-def _is_open(labels, beside, surface, grid):
-    exposed = (_seen(labels, surface, grid) == _outside(labels)).all(axis=1)
-    return (exposed & ~beside).mean() > _OUTSIDE
+def _is_open(labels, surface, grid):
+    return (_seen(labels, surface, grid) == _outside(labels)).all(axis=1).mean() > _OUTSIDE
 
 
 def _seen(labels, surface, grid):
@@ -253,14 +253,16 @@ def _sides(edges: Iterable, n, outside, progress):
 
 def _without_specks(inside, beside, surface, grid):
     """With connected sets of less than _SPECK nodes on one side turned over, but for those with a node whose nearest
-    sample is marked in `beside` (n,): thin walls and slits hold no more nodes."""
+    sample is marked in `beside` (n,), if they are few of that side: thin walls and slits hold no more nodes."""
     for side in (True, False):
         part, _ = regions(each(lambda here: here == side, inside))  # noqa: B023  called at once
-        small = counts(part) < _SPECK
+        size = counts(part)
+        small = size < _SPECK
         small[0] = False
         node = marked_nodes(each(lambda name: small[name], part))  # noqa: B023
         between = beside[surface.tree.query(grid.positions(node), workers=-1)[1]]
-        small[at_nodes(part, node[between])] = False
+        held = np.unique(at_nodes(part, node[between]))
+        small[held] = size[held].sum() > _HELD * size[1:].sum()
         inside = each(lambda here, name: here ^ small[name], inside, part)  # noqa: B023
     return inside
 

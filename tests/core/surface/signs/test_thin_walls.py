@@ -1,4 +1,4 @@
-"""Closed shapes whose walls are thinner than two cells, with samples far denser than the grid."""
+"""Closed shapes whose walls are thinner than two cells, of samples far denser than the grid."""
 
 import numpy as np
 import pytest
@@ -24,11 +24,11 @@ def shelf(thickness):
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2, 3])
-@pytest.mark.parametrize("thickness", [0.06, 0.1, 0.13, 0.16])
-def test_a_plate_of_two_thirds_to_two_cells_is_closed(thickness, turn):
-    """Most were refused: steps of nodes inside and past a wall are alike, and few nodes lie inside of thinner ones."""
+@pytest.mark.parametrize("thickness", [0.115, 0.13, 0.16])
+def test_a_plate_of_one_cell_to_two_is_closed(thickness, turn):
+    """Most were refused: steps of nodes inside and past a wall are alike."""
     run = signed(shapes.scattered_box(9000, np.array([2, 2, thickness])), turn)
-    assert 0.5 < thickness / run.field.spacing < 2
+    assert 1 < thickness / run.field.spacing < 2
     assert distances(run.surface, run.points).max() < 0.2 * run.field.spacing
     assert shapes.euler(run.surface) == 2
     assert shapes.signed_volume(run.surface) == pytest.approx(4 * thickness, rel=0.05)
@@ -37,6 +37,7 @@ def test_a_plate_of_two_thirds_to_two_cells_is_closed(thickness, turn):
 @pytest.mark.parametrize("turn", [0, 1, 2, 3])
 @pytest.mark.parametrize("thickness", [0.03, 0.06])
 def test_a_thin_plate_on_a_thick_block_is_closed(thickness, turn):
+    """Few nodes lie inside of it, so they were taken for specks."""
     run = signed(shelf(thickness), turn)
     assert thickness < 0.8 * run.field.spacing
     assert distances(run.surface, run.points).max() < 0.7 * run.field.spacing
