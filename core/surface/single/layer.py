@@ -11,7 +11,6 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...progress import Progress
-from ..edges.close_walls import beside_within_cells
 from ..edges.crossings import Crossings, find_crossings
 from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
@@ -39,8 +38,7 @@ class SingleLayer:
 
     @cached_property
     def meetings(self) -> Meetings:
-        found = find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
-        return found.with_beside(beside_within_cells(self.band, self.local, self.grid))
+        return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
 
     @cached_property
     def crossings(self) -> Crossings:

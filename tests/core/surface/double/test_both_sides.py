@@ -443,11 +443,11 @@ def test_where_the_double_cover_is_a_block_the_single_layer_is_none_of_its_sides
         assert misfit.misfit(mesh, fitted(run), run.field.spacing)[1] < 0.01
 
 
-@pytest.mark.parametrize(("layers", "apart", "resolution", "said"), [(7, 0.04, 16, True), (3, 0.05, 20, False)])
-def test_a_cover_that_merges_sheets_says_so(layers, apart, resolution, said):
-    """Layers .44 and .69 cells apart."""
-    points = folded_cloth(10_000, layers, apart)
-    run = reconstruct(points, Settings(resolution=resolution, denoise=0))
+@pytest.mark.parametrize(("layers", "said"), [(3, True), (4, False)])
+def test_a_cover_that_merges_sheets_says_so(layers, said):
+    """Layers .7 cells apart."""
+    points = folded_cloth(10_000, layers)
+    run = reconstruct(points, Settings(resolution=20, denoise=0))
     _, missed = misfit.misfit(run.surface, fitted(run), run.field.spacing)
     assert (missed > 0.02) == said
     warning = f"{missed:.0%} of the points lie more than 0.5 cells off the double cover"
