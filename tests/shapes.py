@@ -111,6 +111,13 @@ def scattered_rectangles(corners, n: int) -> np.ndarray:
     return np.concatenate([rng.uniform(*each, (m, 3)) for each, m in zip(corners, count, strict=True)])
 
 
+def scattered_box(n: int, size) -> np.ndarray:
+    """About n random points, even over a box of that size (3,)."""
+    ends = np.diag(size)
+    lower = [(np.zeros(3), size - end) for end in ends]
+    return scattered_rectangles([*lower, *((end, np.array(size)) for end in ends)], n)
+
+
 def sphere_distance(x: np.ndarray, radius: float = 1.0) -> np.ndarray:
     return np.abs(np.linalg.norm(x, axis=1) - radius)
 

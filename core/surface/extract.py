@@ -253,10 +253,10 @@ def extract_surfaces(
                 "there, or sheets meet; use the double cover where both sides must show"
             )
     if kind == "signed":
-        sides = layers.single.sides
+        sides, meetings = layers.single.sides, layers.single.crossings.meetings
         values = signed_distance(values, sides, local, place)
         part = progress.part(0.6, 1.0, "signed surface")
-        meshes["signed"] = boundary_of_inside(values, layers.meetings, local, grid, lambda: layers.extracted, part)
+        meshes["signed"] = boundary_of_inside(values, meetings, local, grid, lambda: layers.extracted, part)
         if not sides.complete:
             warnings.append(
                 f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "

@@ -5,7 +5,7 @@ is on the other's tangent plane, where no sample between them lies on one sheet 
 sheets either run side by side or one goes on past the other's plane; where many pairs of a neighbourhood do.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -65,6 +65,10 @@ class Meetings:
     def side_by_side(self) -> bool:
         """Whether sheets run so close beside each other that single layers are torn there."""
         return not self.few and bool(self._share(self.beside) > _BESIDE)
+
+    def with_beside(self, others: np.ndarray) -> "Meetings":
+        """These and samples (n,) bool known to be beside another sheet."""
+        return replace(self, at=self.at | others, beside=self.beside | others)
 
     def _share(self, some):
         return some.sum() / max(self.at.sum(), 1)

@@ -11,6 +11,7 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...progress import Progress
+from ..edges.close_walls import beside_within_cells
 from ..edges.crossings import Crossings, find_crossings
 from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
@@ -40,15 +41,30 @@ class SingleLayer:
     def meetings(self) -> Meetings:
         return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
 
-    @cached_property
+    @property
     def crossings(self) -> Crossings:
-        part = self.progress.part(0.05, 0.2, "crossings")
-        return find_crossings(self.band, self.local, self.grid, part, self.meetings)
+        return self._crossings_and_sides[0]
+
+    @property
+    def sides(self) -> Sides:
+        return self._crossings_and_sides[1]
 
     @cached_property
-    def sides(self) -> Sides:
-        part = self.progress.part(0.2, 0.3, "crossings")
-        return find_sides(self.values, self.crossings, self.local, self.grid, part)
+    def _crossings_and_sides(self):
+        """Those by the meetings; where no inside is bounded then, by close walls that dense samples do not show, too,
+        if one is with them. Elsewhere such walls bring lines."""
+        found = self._found_by(self.meetings, self.progress.part(0.05, 0.2, "crossings"))
+        if found[1].complete or found[1].share == 1:
+            return found
+        close = beside_within_cells(self.band, self.local, self.grid)
+        if not (close & ~self.meetings.beside).any():
+            return found
+        other = self._found_by(self.meetings.with_beside(close), self.progress.part(0.2, 0.3, "crossings"))
+        return other if other[1].complete else found
+
+    def _found_by(self, meetings, progress):
+        crossings = find_crossings(self.band, self.local, self.grid, progress.part(0.0, 0.6), meetings)
+        return crossings, find_sides(self.values, crossings, self.local, self.grid, progress.part(0.6, 1.0))
 
     @cached_property
     def between(self) -> Mesh | None:
@@ -81,7 +97,7 @@ class SingleLayer:
     @property
     def fit(self) -> tuple[float, float]:
         """The same, but 0 where it bounds the inside and no sheets run side by side, as in thin walls."""
-        plain = self.sides.complete and not self.meetings.side_by_side
+        plain = self.sides.complete and not self.crossings.meetings.side_by_side
         return (0.0, 0.0) if plain else self.misfit
 
     @property

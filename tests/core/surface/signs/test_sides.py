@@ -161,7 +161,7 @@ def test_a_speck_is_no_inside_but_between_sheets_side_by_side(surface, beside):
     distance = np.abs(RADIUS - 1)
     distance[1:4, 1:4, 1:4] = 0.05
     near = np.linalg.norm(surface.points - (GRID.origin + 2 * GRID.spacing), axis=1) < 1.2
-    crossings = replace(crossings_of(inside), meetings=replace(NO_MEETINGS, beside=near & beside))
+    crossings = replace(crossings_of(inside), meetings=NO_MEETINGS.with_beside(near & beside))
     np.testing.assert_array_equal(
         find_sides(distance, crossings, surface, GRID).inside, inside if beside else RADIUS < 1
     )
@@ -172,7 +172,7 @@ def test_specks_alone_make_no_inside(surface):
     inside, distance = np.zeros(GRID.shape, bool), np.full(GRID.shape, 9.0)
     inside[2, 2, 2] = True
     distance[1:4, 1:4, 1:4] = 0.05
-    crossings = replace(crossings_of(inside), meetings=replace(NO_MEETINGS, beside=np.ones(1500, bool)))
+    crossings = replace(crossings_of(inside), meetings=NO_MEETINGS.with_beside(np.ones(1500, bool)))
     assert not find_sides(distance, crossings, surface, GRID).inside.any()
 
 

@@ -1,5 +1,6 @@
-"""Closed shapes with walls thinner than a cell beside thick parts, of samples far denser than the grid."""
+"""Closed shapes whose walls are thinner than two cells, of samples far denser than the grid."""
 
+import numpy as np
 import pytest
 
 from core import Settings, reconstruct
@@ -20,6 +21,17 @@ def shelf(thickness):
     plate = [((1, 0, low), (2, 2, low)), ((1, 0, high), (2, 2, high)), ((1, 0, low), (2, 0, high))]
     plate += [((1, 2, low), (2, 2, high)), ((2, 0, low), (2, 2, high))]
     return shapes.scattered_rectangles(block + plate, 12000)
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+@pytest.mark.parametrize("thickness", [0.115, 0.13])
+def test_a_plate_of_one_cell_to_two_is_closed(thickness, turn):
+    """Most were refused: nodes inside and past a wall see the surface on the same side."""
+    run = signed(shapes.scattered_box(9000, np.array([2, 2, thickness])), turn)
+    assert 1 < thickness / run.field.spacing < 2
+    assert distances(run.surface, run.points).max() < 0.2 * run.field.spacing
+    assert shapes.euler(run.surface) == 2
+    assert shapes.signed_volume(run.surface) == pytest.approx(4 * thickness, rel=0.05)
 
 
 @pytest.mark.parametrize("turn", [0, 1, 2, 3])
