@@ -1,11 +1,16 @@
 """Closed shapes whose walls are thinner than two cells, of samples far denser than the grid."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from core import Settings, reconstruct
+from core.io.points import read_points
 from core.surface.meshing.misfit import distances
 from tests import shapes
+
+BUST = Path(__file__).parents[3] / "data" / "bust.ply"
 
 
 def signed(points, turn):
@@ -43,3 +48,10 @@ def test_a_thin_plate_on_a_thick_block_is_closed(thickness, turn):
     assert distances(run.surface, run.points).max() < 0.7 * run.field.spacing
     assert shapes.euler(run.surface) == 2
     assert shapes.signed_volume(run.surface) == pytest.approx(2 + 2 * thickness, rel=0.02)
+
+
+def test_an_open_bust_with_a_thin_foot_has_no_handles():
+    """It had ten with sheets side by side told by the steps to nodes, and its points were twice as far off."""
+    run = reconstruct(read_points(BUST)[::3], Settings(resolution=48))
+    assert shapes.euler(run.surface) == 2
+    assert distances(run.surface, run.points).mean() < 0.03 * run.field.spacing
