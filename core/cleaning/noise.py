@@ -8,6 +8,7 @@ from ..normals.reflection import reflection_sweeps
 from ..progress import Progress
 from ..voronoi.facets import voronoi_facets
 from .anchors import SMOOTHING, nearest_anchor, some_samples
+from .flat_patches import shows_flat_patches
 from .roughness import least_part, roughness
 from .thin_walls import shows_thin_walls
 
@@ -38,8 +39,8 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     A cloud is noisy as a whole where nearly all of it looks so; noise of hundredths of a local spacing, as of rounded
     coordinates, counts where it grows no more up to 32 neighbours, either. Otherwise its noisy parts are those that
     look so throughout, or around a core that is well above all limits and not small: creases and thin sheets look noisy
-    in places. Nothing is noisy where two sheets show that are hardly farther apart than the noise would be, see
-    :mod:`.thin_walls`.
+    in places. Nothing is noisy where samples show that they lie on flat faces, see :mod:`.flat_patches`, or on two
+    sheets that are hardly farther apart than the noise would be, see :mod:`.thin_walls`.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
@@ -50,7 +51,8 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         if suspect.any():
             level = np.median(found.relative[suspect])
             suspect = suspect[found.region[:, :SMOOTHING]].any(axis=1)  # noise left beside would stand out as a seam
-            if not shows_thin_walls(points, spacing, found.anchors[suspect], level, part):
+            looked = points, spacing, found.anchors[suspect], level
+            if not (shows_flat_patches(*looked) or shows_thin_walls(*looked, part)):
                 break
     else:
         return clean

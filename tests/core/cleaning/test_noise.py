@@ -167,6 +167,32 @@ def test_walls_of_two_thicknesses_are_no_noise():
     assert not noisy_samples(points, local_spacing(points)).any()
 
 
+def stacked(sheets, gap, n=6000):
+    """Points at random on flat sheets `gap` local spacings apart, askew in the box."""
+    points = shapes.square(n)
+    points[:, 2] += gap * np.median(local_spacing(points)) * np.random.default_rng(1).integers(sheets, size=n)
+    return Rotation.from_euler("xyz", [20, 30, 40], degrees=True).apply(points)
+
+
+@pytest.mark.parametrize(("sheets", "gap"), [(5, 0.4), (6, 0.3), (8, 0.2)])
+def test_stacks_of_flat_sheets_are_no_noise(sheets, gap):
+    points = stacked(sheets, gap)
+    spacing = local_spacing(points)
+    assert looks_noisy(points, spacing)
+    assert not noisy_samples(points, spacing).any()
+    assert noisy_samples(noisy(points, 0.1 * np.median(spacing)), spacing).all()
+
+
+@pytest.mark.parametrize("steps", [0.25, 0.5, 1.0, 2.0])
+def test_noise_that_rounding_lays_on_planes_is_noise(steps):
+    """By steps in standard deviations of it."""
+    points = shapes.square(6000)
+    deviation = 0.3 * np.median(local_spacing(points))
+    points = noisy(points, deviation)
+    points = np.unique(steps * deviation * np.rint(points / (steps * deviation)), axis=0)
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
 def test_noise_beside_thin_walls_is_found():
     """The cloud looks noisy as a whole; as it has walls, its parts are looked at."""
     ball = shapes.scattered_sphere(8000)
