@@ -10,7 +10,7 @@ from ..voronoi.facets import voronoi_facets
 from .anchors import SMOOTHING, nearest_anchor, some_samples
 from .flat_patches import shows_flat_patches
 from .roughness import least_part, roughness
-from .thin_walls import shows_thin_walls
+from .thin_walls import is_shift, two_sheets
 
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
 
@@ -39,8 +39,8 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     A cloud is noisy as a whole where nearly all of it looks so; noise of hundredths of a local spacing, as of rounded
     coordinates, counts where it grows no more up to 32 neighbours, either. Otherwise its noisy parts are those that
     look so throughout, or around a core that is well above all limits and not small: creases and thin sheets look noisy
-    in places. Nothing is noisy where samples show that they lie on flat faces, see :mod:`.flat_patches`, or on two
-    sheets that are hardly farther apart than the noise would be, see :mod:`.thin_walls`.
+    in places. Nothing is noisy where samples show two sheets that are hardly farther apart than the noise would be, see
+    :mod:`.thin_walls`, or that they lie on flat faces, see :mod:`.flat_patches`.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
@@ -51,12 +51,20 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
         if suspect.any():
             level = np.median(found.relative[suspect])
             suspect = suspect[found.region[:, :SMOOTHING]].any(axis=1)  # noise left beside would stand out as a seam
-            looked = points, spacing, found.anchors[suspect], level
-            if not (shows_flat_patches(*looked) or shows_thin_walls(*looked, part)):
+            if not _seems_only(points, spacing, found.anchors[suspect], level, part):
                 break
     else:
         return clean
     return suspect[nearest_anchor(points, points[found.anchors], progress.part(0.9, 1.0))]
+
+
+def _seems_only(points, spacing, anchors, level, progress):
+    """Whether samples that seem to have noise of `level` local spacings at some anchors are free of it: those of thin
+    walls, or on flat faces, and not of two scans that are shifted against each other."""
+    sheets = two_sheets(points, spacing, anchors, level, progress)
+    if sheets is not None:
+        return not is_shift(*sheets)
+    return shows_flat_patches(points, spacing, anchors, level)
 
 
 def _noisy_anchors(points, spacing, found, seed, progress):

@@ -18,15 +18,12 @@ _AXES, _DIVERSE = 3, 0.1  # normals along few axes leave hardly this share of th
 _TWICE = np.array([1, 1, 1, 2, 2, 2])  # how often a product of two components stands in a symmetric form
 
 
-def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> bool:
-    """Whether samples (n,3) that seem to have noise of `level` local spacings are of thin walls, and free of noise.
+def two_sheets(points, spacing, anchors, level: float, progress=None) -> tuple[np.ndarray, np.ndarray] | None:
+    """Half the distances (w,) of two sheets that samples (n,3) show, sharply, where they seem to have noise of `level`
+    local spacings, which would spread them about one sheet; and normals (w,3) there. None where they show none.
 
     points  : (n,3) float64, n > 32     spacing : (n,) float64, local spacing, same units
     anchors : (m,) int, rows that look noisy
-
-    Noise spreads samples about one sheet. Where they show two instead, sharply, there is none; elsewhere what looks
-    like noise is detail, too, such as walls that run in all directions. Two scans of one surface, shifted against each
-    other, also show two sheets; but these are as far apart as the shift is long along the normal, walls all over alike.
     """
     fits = nested_residuals(points, anchors, [k for k in _SIZES if k < len(points)], progress)
     around = KDTree(points[anchors]).query(points[anchors], k=min(_AROUND, len(anchors)), workers=-1)[1]
@@ -36,13 +33,14 @@ def shows_thin_walls(points, spacing, anchors, level: float, progress=None) -> b
     relative = half / spacing[anchors]
     two = (kurtosis[best, row] < _TWO) & (relative > _SEEN) & (relative < _MOST * level)
     if (two & (relative > _LEAST)).sum() < max(_AROUND, _SHARE * len(two)):
-        return False
-    return not _shifted(half[two], np.stack([fit.normal for fit in fits])[best, row][two])
+        return None
+    return half[two], np.stack([fit.normal for fit in fits])[best, row][two]
 
 
-def _shifted(half, normal):
-    """Whether half the distances (m,) of two sheets with normals (m,3) are those of a shift. With few directions one
-    may fit walls, too."""
+def is_shift(half: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether two sheets with half the distances (w,) and normals (w,3) are two scans of one surface, shifted against
+    each other: these are as far apart as the shift is long along the normal, walls all over alike. With few directions
+    a shift may fit walls, too: no then."""
     products = outer(normal) * _TWICE
     squares, _, _, kinds = np.linalg.lstsq(products, half**2, rcond=None)
     if kinds[_AXES] < _DIVERSE * kinds[0]:

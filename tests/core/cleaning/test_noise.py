@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from core.cleaning.flat_patches import shows_flat_patches
 from core.cleaning.noise import looks_noisy, noisy_samples
 from core.cleaning.noise_level import LADDER, estimate_noise, in_full
 from core.neighbourhoods.quadrics import fit_quadrics
@@ -140,6 +141,19 @@ def test_shifted_scans_are_noisy_as_a_whole(height, share):
     assert not noisy_samples(points, local_spacing(points)).any()
     second = np.random.default_rng(1).random(len(points)) < 0.5
     points[second] += share * np.median(local_spacing(points)) * np.array([0.3, 0.4, 0.866])
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
+def test_shifted_scans_of_flat_faces_are_noisy():
+    """Though every point lies on a face of one of them."""
+    golden = (1 + np.sqrt(5)) / 2
+    axes = [np.roll([0.0, 1.0, sign * golden], turn) for turn in range(3) for sign in (-1, 1)]
+    ball = shapes.scattered_sphere(5000)
+    points = ball / np.abs(ball @ np.transpose(axes)).max(axis=1)[:, None]
+    assert not noisy_samples(points, local_spacing(points)).any()
+    second = np.random.default_rng(1).random(len(points)) < 0.5
+    points[second] += 0.4 * np.median(local_spacing(points)) * np.array([0.3, 0.4, 0.866])
+    assert shows_flat_patches(points, local_spacing(points), np.arange(0, 5000, 2), 0.1)
     assert noisy_samples(points, local_spacing(points)).all()
 
 
