@@ -58,11 +58,13 @@ def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
 
 @pytest.mark.parametrize(("samples", "settings"), [(8000, {}), (1500, {"surface": "both"}), (4000, {"band": 4.0})])
 def test_processor_time_is_what_a_run_takes_within_a_factor_of_three(samples, settings):
-    settings = Settings(resolution=96, denoise=0, **settings)
-    begun = time.process_time()
-    estimated = reconstruct(shapes.sphere(samples), settings).report["estimate"]["cpu_seconds"]
-    taken = time.process_time() - begun
-    assert taken / 3 < estimated < 3 * taken
+    """In the median of three runs: other work on the machine may slow the probe, or the run."""
+    settings, shares = Settings(resolution=96, denoise=0, **settings), []
+    for _ in range(3):
+        begun = time.process_time()
+        estimated = reconstruct(shapes.sphere(samples), settings).report["estimate"]["cpu_seconds"]
+        shares.append(estimated / (time.process_time() - begun))
+    assert 1 / 3 < np.median(shares) < 3
 
 
 def test_no_more_nodes_are_near_the_surface_than_there_are():
