@@ -3,14 +3,12 @@
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import row_dots
-
 _NEIGHBOURS, _PLANES = 32, 64  # of each anchor, and planes tried through it and two of those
 _FLAT = 0.02  # times the noise there seems to be, off a plane; noise leaves two in a hundred samples so close
-_MORE = 6  # samples on a plane, beside the three that it is laid through; of noise one patch in 2000 has so many
+_MORE = 6  # samples on a plane, beside the three that it is laid through; of noise hardly any has so many
 _SLIM = 0.2  # sine of the angle at the anchor, at least
-_SHARE = 0.03  # of the anchors, at least, with such a plane; on noise of .1 to 1.5 spacings at most .002 are
-_STEPS = 0.25  # times the noise, steps that coordinates are rounded to, at most: coarser ones lay noise on planes
+_SHARE = 0.03  # of the anchors, at least, with such a plane; on noise of .1 and .3 spacings .0012 have one at most
+_STEPS = 0.25  # times the noise, steps of rounding, at most: .0024 have one then, with steps as long up to .46
 _SAME = 1e-9  # of the extent, by which values of one step differ
 
 
@@ -34,7 +32,7 @@ def shows_flat_patches(points, spacing, anchors, level: float) -> bool:
     for _ in range(_PLANES):
         a, b = rng.choice(_NEIGHBOURS - 1, 2, replace=False)
         normal = np.cross(offset[:, a], offset[:, b])
-        size = np.sqrt(row_dots(normal, normal))
+        size = np.linalg.norm(normal, axis=1)
         flat = np.abs(np.einsum("mki,mi->mk", offset, normal)) < _FLAT * size[:, None]
         laid = size > _SLIM * length[:, a] * length[:, b]
         np.maximum(most, np.where(laid, flat.sum(axis=1) - 2, 0), out=most)
