@@ -6,9 +6,9 @@ import numpy as np
 
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
-from ...field.projection import MEMBER
 from ...field.steps import NearBand
 from ...linalg import row_dots
+from ...parallel import in_order
 from ...progress import Progress
 from .meetings import Meetings
 from .sheets import Sheets, one_sheet, sheets_near
@@ -59,7 +59,7 @@ def meeting_edges(
     number[row] = np.arange(len(row))
     ahead, back = number[band.ahead[:, row]], number[band.behind[:, row]]
     sheets = sheets_near(surface, x, [*ahead, *back], cell, progress.part(0.0, 0.9))
-    found = [_along(axis, ahead[axis], sheets, x, cell, hair) for axis in range(3)]
+    found = [found for _, found in in_order(lambda axis: _along(axis, ahead[axis], sheets, x, cell, hair), range(3))]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
     one, place, normal, crossed, certainty, beyond, near = (np.concatenate(part) for part in zip(*found, strict=True))
     kept = _reaches(place, normal, beyond, sheets, near, surface, len(row), cell)
@@ -116,19 +116,20 @@ def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell):
     for i in range(count.max(initial=0)):
         other = first[sheets.node[near]] + i
         row = np.flatnonzero((count[sheets.node[near]] > i) & (other != near))
+        row = row[sheets.beyond[other[row]] <= _CUTS * cell]
+        row = row[np.abs(row_dots(sheets.axis[other[row]], normal[row])) < _ACROSS]
         own, other = near[row], other[row]
         axis, foot = sheets.axis[other], sheets.foot[other]
-        ends = (sheets.beyond[other] <= _CUTS * cell) & (np.abs(row_dots(axis, normal[row])) < _ACROSS)
         height = row_dots(place[row] - foot, axis)
         up = np.where(height < 0, -1.0, 1.0)
         heights = np.einsum("eki,ei->ek", surface.points[sheets.sample[own]] - foot[:, None], axis) * up[:, None]
-        member = sheets.member[own] > MEMBER
+        member = sheets.member[own]
         spacing = surface.spacing[sheets.sample[own, sheets.anchor[own]]]
         this_side = np.where(member, heights, -np.inf).max(axis=1) >= _BEYOND * spacing
-        cut[row[ends & ~this_side]] = True
+        cut[row[~this_side]] = True
         gap = np.where(member, np.abs(heights), np.inf).min(axis=1)
         out = sheets.outward[own]
         straight = -up * row_dots(out, axis) > _STRAIGHT * np.linalg.norm(out, axis=1)
         short = (gap < _GAP * spacing) & (np.abs(height) <= np.minimum(_STEP * spacing, _FAR * cell))
-        covered[row[ends & this_side & straight & short]] = True
+        covered[row[this_side & straight & short]] = True
     return covered & ~cut

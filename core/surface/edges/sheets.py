@@ -30,9 +30,10 @@ _BENT, _OFF = 0.35, 0.1  # its feet are off each other's plane by this share of 
 class Sheets:
     """Pairs of a node and a sheet near it, by ascending node.
 
-    node   : (p,) int64, row of the node           tau, axis, beyond, outward, member : as in SheetFoot, (p,...)
+    node   : (p,) int64, row of the node           tau, axis, beyond, outward : as in SheetFoot, (p,...)
+    member : (p,k) bool, whether each sample near the node belongs to the sheet
     foot   : (p,3) float64, where the node falls on the sheet, continued past its rims
-    sample : (p,k) int64, samples near the node    anchor : (p,) int64, number of the sample that stands for the sheet
+    sample : (p,k) int32, samples near the node    anchor : (p,) int64, number of the sample that stands for the sheet
     """
 
     node: np.ndarray
@@ -52,10 +53,9 @@ class Sheets:
         return Sheets(*[getattr(self, field.name)[chosen] for field in fields(self)])
 
     def joined(self, *others: "Sheets") -> "Sheets":
-        """These and others, by node; of one node, these first."""
+        """These and others after them."""
         parts = [self, *others]
-        every = Sheets(*[np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(self)])
-        return every[np.argsort(every.node, kind="stable")]
+        return Sheets(*[np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(self)])
 
     def span(self, nodes: int) -> tuple[np.ndarray, np.ndarray]:
         """First pair of each node and their number, (nodes,) each."""
@@ -73,11 +73,10 @@ def sheets_near(
     """
     progress = Progress.of(progress)
     chunks = even_chunks(len(x), CHUNK, progress)
-    found = [sheets for _, sheets in in_order(lambda part: _sheets_of(surface, x, part), chunks)]
+    found = [sheets for _, sheets in in_order(lambda part: _sheets_of(surface, x, part, cell), chunks)]
     sheets = found[0].joined(*found[1:])
-    sheets = _distinct(sheets[np.abs(sheets.tau) <= REACH * cell], surface, len(x), cell)
     told = [found for _, found in in_order(partial(_told, sheets, surface, x, cell), neighbours)]
-    return _distinct(sheets.joined(*told), surface, len(x), cell)
+    return _distinct(sheets.joined(*told), surface, cell)
 
 
 def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +88,7 @@ def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray
     return (cosine > ALIKE) & (off <= limit), off / cell + 1 - cosine
 
 
-def _sheets_of(surface, x, part):
+def _sheets_of(surface, x, part, cell):
     part = np.arange(part.start, part.stop)
     distance, sample = surface.tree.query(x[part], k=min(_NEAREST, len(surface.points)))
     rest = surface.confidence[sample] >= TRUSTED
@@ -103,30 +102,37 @@ def _sheets_of(surface, x, part):
         row = row[rest[row].any(axis=1)]
         anchor = rest[row].argmax(axis=1)
         found.append(_on_sheet(part[row], x[part[row]], near.rows(row), anchor))
-        rest[row] &= found[-1].member <= MEMBER
-    return found[0].joined(*found[1:])
+        rest[row] &= ~found[-1].member
+    sheets = found[0].joined(*found[1:])
+    return _distinct(sheets[np.abs(sheets.tau) <= REACH * cell], surface, cell)
 
 
 def _on_sheet(node, x, near, anchor):
     foot = sheet_foot(near, anchor)
     place = x - foot.tau[:, None] * foot.axis
-    return Sheets(node, foot.tau, foot.axis, foot.beyond, foot.outward, foot.member, place, near.sample, anchor)
+    member, sample = foot.member > MEMBER, near.sample.astype(np.int32)
+    return Sheets(node, foot.tau, foot.axis, foot.beyond, foot.outward, member, place, sample, anchor)
 
 
-def _distinct(sheets, surface, nodes, cell):
-    """Without what says of a node the same as a pair before it."""
-    first, count = sheets.span(nodes)
-    dropped = np.zeros(len(sheets), bool)
-    for i in range(count.max(initial=0)):
-        for j in range(i + 1, count.max(initial=0)):
-            one = first[count > j] + i
-            other = one - i + j
-            cosine = np.abs(row_dots(sheets.axis[one], sheets.axis[other]))
-            spacing = surface.spacing[sheets.sample[one, sheets.anchor[one]]]
-            near = np.linalg.norm(sheets.foot[one] - sheets.foot[other], axis=1)
-            same = (cosine > _SAME_ANGLE) & (near < np.maximum(_SAME_FOOT[0] * cell, _SAME_FOOT[1] * spacing))
-            dropped[other[same & ~dropped[one]]] = True
-    return sheets[~dropped]
+def _distinct(sheets, surface, cell):
+    """By node, of one node in their order, without what says of it the same as a pair before."""
+    order = np.argsort(sheets.node, kind="stable")
+    axis, foot = sheets.axis[order], sheets.foot[order]
+    spacing = surface.spacing[sheets.sample[order, sheets.anchor[order]]]
+    kept = np.ones(len(order), bool)
+    first = np.flatnonzero(np.diff(sheets.node[order], prepend=-1))
+    rest = np.diff(first, append=len(order))
+    while len(first):
+        first, rest = first + 1, rest - 1
+        first, rest = first[rest > 0], rest[rest > 0]
+        at = np.flatnonzero(kept[first - 1])
+        one = np.repeat(first[at] - 1, rest[at])
+        other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(rest[at]) - rest[at], rest[at])
+        one, other = one[kept[other]], other[kept[other]]
+        near = np.linalg.norm(foot[one] - foot[other], axis=1)
+        same = near < np.maximum(_SAME_FOOT[0] * cell, _SAME_FOOT[1] * spacing[one])
+        kept[other[same & (np.abs(row_dots(axis[one], axis[other])) > _SAME_ANGLE)]] = False
+    return sheets[order[kept]]
 
 
 def _told(sheets, surface, x, cell, towards):
