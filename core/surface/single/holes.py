@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots
+from ...linalg import cross, dots, row_dots
 from ...lookup import numbered, rows_of
 from ..mesh import Mesh, at_corners
 from ..meshing.fillings import edge_keys, face_keys, fillings
@@ -108,15 +108,14 @@ def _doubled(mesh, border, loops):
     own = np.flatnonzero(np.isin(key, edge_keys(border, n)))
     own = own[np.argsort(key[own])]
     key, beyond = key[own], mesh.vertices[beyond[own]]
-    share = np.empty(len(loops))
-    for number, loop in enumerate(loops):
-        tail, head = mesh.vertices[loop], mesh.vertices[np.roll(loop, -1)]
-        wanted = edge_keys(np.stack([loop, np.roll(loop, -1)], axis=1), n)
-        row = rows_of(wanted, key)
-        length = np.linalg.norm(head - tail, axis=1) * (row >= 0)
-        axis = _unit(np.cross(tail - tail[0], head - tail[0]).sum(axis=0))
-        share[number] = length @ _unit(np.cross(head - tail, beyond[row] - tail)) @ axis / max(length.sum(), _TINY)
-    return share
+    corner, after = (np.concatenate(part) for part in (loops, [np.roll(loop, -1) for loop in loops]))
+    of = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
+    tail, head, start = mesh.vertices[corner], mesh.vertices[after], mesh.vertices[[loop[0] for loop in loops]][of]
+    row = rows_of(edge_keys(np.stack([corner, after], axis=1), n), key)
+    length = np.linalg.norm(head - tail, axis=1) * (row >= 0)
+    axis = _unit(np.stack([np.bincount(of, x) for x in np.cross(tail - start, head - start).T], axis=1))
+    side = row_dots(_unit(np.cross(head - tail, beyond[row] - tail)), axis[of])
+    return np.bincount(of, length * side) / np.maximum(np.bincount(of, length), _TINY)
 
 
 def _covered(mesh, triangle, loop, loops, cell):
