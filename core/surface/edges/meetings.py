@@ -28,7 +28,7 @@ _PAST = 1.0  # local spacings along itself that a sheet goes on, on either side 
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 _WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
-_FEW = 0.005  # of all samples, at meetings, or that show no line of sheets passing through: as few may be chance
+_FEW = 0.005  # of all samples, at meetings, beside others, or that show no line: as few may be chance
 _THROUGH = 0.125  # of the samples at meetings, as many of sheets that pass through one another are no chance
 _BESIDE = 0.05  # the same, more than so many, of samples beside another sheet
 _LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all these, at least
@@ -67,7 +67,10 @@ class Meetings:
         return not self.few and bool(self._share(self.beside) > _BESIDE)
 
     def with_beside(self, others: np.ndarray) -> "Meetings":
-        """These and samples (n,) bool known to be beside another sheet."""
+        """These and samples (n,) bool known to be beside another sheet; these alone where so few are new that they may
+        be chance."""
+        if (others & ~self.beside).mean() <= _FEW:
+            return self
         return replace(self, at=self.at | others, beside=self.beside | others)
 
     def _share(self, some):

@@ -17,6 +17,7 @@ from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
 from ..meshing.misfit import misfit
 from ..signs.sides import Sides, find_sides
+from ..signs.two_sides import two_sided
 from .single_layer import BETTER, ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
 from .thin_walls import with_thin_walls
 
@@ -56,10 +57,10 @@ class SingleLayer:
         found = self._found_by(self.meetings, self.progress.part(0.05, 0.2, "crossings"))
         if found[1].complete or found[1].share == 1:
             return found
-        close = beside_within_cells(self.band, self.local, self.grid)
-        if not (close & ~self.meetings.beside).any():
+        more = self.meetings.with_beside(beside_within_cells(self.band, self.local, self.grid))
+        if more is self.meetings:
             return found
-        other = self._found_by(self.meetings.with_beside(close), self.progress.part(0.2, 0.3, "crossings"))
+        other = self._found_by(more, self.progress.part(0.2, 0.3, "crossings"))
         return other if other[1].complete else found
 
     def _found_by(self, meetings, progress):
@@ -67,11 +68,17 @@ class SingleLayer:
         return crossings, find_sides(self.values, crossings, self.local, self.grid, progress.part(0.6, 1.0))
 
     @cached_property
+    def two_sides(self) -> np.ndarray | Blocks | None:
+        """Distances with the signs of the two sides of a surface that bounds no inside, see :func:`two_sided`."""
+        part = self.progress.part(0.3, 0.35, "single layer")
+        return two_sided(self.values, self.band, self.crossings, self.local, self.grid, part)
+
+    @cached_property
     def between(self) -> Mesh | None:
         """What lies between the two sides of a surface that bounds no inside."""
-        part = self.progress.part(0.3, 0.5, "single layer")
-        given = self.values, self.band, self.crossings, self.sides, self.local, self.grid
-        return sheet_between_sides(*given, part)
+        part = self.progress.part(0.35, 0.5, "single layer")
+        given = self.band, self.crossings, self.sides, self.local, self.grid
+        return sheet_between_sides(lambda: self.two_sides, *given, part)
 
     @cached_property
     def of_sides(self) -> Mesh | None:
@@ -86,8 +93,8 @@ class SingleLayer:
         if self.of_sides is not None:
             return self.of_sides, 0
         part = self.progress.part(0.5, 0.7, "single layer")
-        given = self.values, self.band, self.crossings, self.local, self.grid, self.between
-        return sheet_of_crossings(*given, self.cover, part)
+        given = self.band, self.crossings, self.local, self.grid, self.between
+        return sheet_of_crossings(lambda: self.two_sides, *given, self.cover, part)
 
     @cached_property
     def misfit(self) -> tuple[float, float]:

@@ -1,17 +1,15 @@
 """The single layer: one sheet, open where the surface is open, non-manifold where sheets meet."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from ...field.blocks import Blocks
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...progress import Progress
-from ...settings import Settings
-from ..double.double_cover import double_cover
 from ..edges.crossings import Crossings
 from ..edges.meetings import Meetings
 from ..mesh import Mesh
@@ -19,7 +17,7 @@ from ..meshing.centring import centred
 from ..meshing.misfit import chamfer, misfit
 from ..signed import signed_mesh
 from ..signs.sides import Sides, patch_lengths, patches
-from ..signs.two_sides import LONG, two_sided
+from ..signs.two_sides import LONG
 from ..signs.zero_set import sharpened
 from .dual_contour import dual_contour
 from .holes import fill_pinholes
@@ -38,35 +36,28 @@ _BESIDE = 1.5  # cells from a line of more than two faces; borders there show th
 _BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
 
 
-def single_layer(
-    values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
-) -> tuple[Mesh, int]:
-    """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
-    progress = Progress.of(progress)
-    between = sheet_between_sides(values, band, crossings, sides, surface, grid, progress.part(0.0, 0.3))
-    cover = partial(double_cover, values, band, surface, grid, Settings().offset)
-    sheet = sheet_of_sides(values, crossings, sides, surface, grid, between, cover, progress.part(0.3, 0.5))
-    if sheet is not None:
-        return sheet, 0
-    return sheet_of_crossings(values, band, crossings, surface, grid, between, cover, progress.part(0.5, 1.0))
-
-
 def sheet_between_sides(
-    values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
+    two_sides: Callable[[], np.ndarray | Blocks | None],
+    band: NearBand,
+    crossings: Crossings,
+    sides: Sides,
+    surface: LocalSurface,
+    grid: Grid,
+    progress=None,
 ) -> Mesh | None:
     """What lies between the two sides of a surface that bounds no inside, see :func:`open_sheet`, with one face or two
     at every edge and all wound alike. None where it has no such sides, and where sheets meet but do not run side by
     side, which it may part.
 
-    values : (nx,ny,nz) float32 or Blocks, unsigned distances     band : the nodes near the surface
+    two_sides : function that gives the signed distances of :func:`two_sided`     band : the nodes near the surface
     """
     progress, meetings = Progress.of(progress), crossings.meetings
     if sides.complete or (crossings.normal.any() and not meetings.side_by_side):
         return None
-    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.2))
+    signed = two_sides()
     if signed is None:
         return None
-    found = open_sheet(signed, band, meetings.passing, surface, grid, progress.part(0.2, 0.8))
+    found = open_sheet(signed, band, meetings.passing, surface, grid, progress.part(0.0, 0.8))
     sheet, unoriented = _finished(found, meetings.passing, surface, grid, progress.part(0.8, 1.0))
     return None if unoriented or len(_lines(sheet)) else sheet
 
@@ -116,7 +107,7 @@ def boundary_of_inside(
 
 
 def sheet_of_crossings(
-    values,
+    two_sides: Callable[[], np.ndarray | Blocks | None],
     band: NearBand,
     crossings: Crossings,
     surface: LocalSurface,
@@ -134,8 +125,8 @@ def sheet_of_crossings(
     of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines and no borders in
     their place. Where sheets run side by side all may be torn; then see :func:`_of_torn`.
 
-    between : what lies between the two sides there, which may be torn
-    cover   : function that gives the double cover
+    two_sides, cover : functions that give the signed distances of :func:`two_sided`, and the double cover
+    between          : what lies between the two sides there, which may be torn
     Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
     """
     progress, meetings = Progress.of(progress), crossings.meetings
@@ -149,13 +140,13 @@ def sheet_of_crossings(
     shown = passing.any() and not meetings.side_by_side
     if not chance and (shown or not unoriented):
         return sheet, unoriented
-    signed = two_sided(values, band, crossings, surface, grid, progress.part(0.5, 0.6))
+    signed = two_sides()
     if signed is None:
         return sheet, unoriented
     if meetings.side_by_side:
         one = _finished(one_side(cover(), signed, surface, grid), passing, surface, grid, Progress())
         return _of_torn([one, (between, 0), (sheet, unoriented)], surface, grid)
-    found = open_sheet(signed, band, passing, surface, grid, progress.part(0.6, 0.9))
+    found = open_sheet(signed, band, passing, surface, grid, progress.part(0.5, 0.9))
     found, left = _finished(found, passing, surface, grid, progress.part(0.9, 1.0))
     parted = _borders_beside(lines, found, grid.spacing)
     replaces = not (left or parted or len(_lines(found))) if chance else parted <= _BORDERED * len(lines)

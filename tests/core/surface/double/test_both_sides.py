@@ -486,8 +486,8 @@ def test_a_run_leaves_out_pockets_of_a_few_faces_beside_the_sheet(monkeypatch):
     found = layer.sheet_of_crossings
     points, settings = shapes.junction(2000), Settings(resolution=48)
 
-    def with_pocket(values, band, crossings, surface, grid, *rest):
-        mesh, unoriented = found(values, band, crossings, surface, grid, *rest)
+    def with_pocket(two_sides, band, crossings, surface, grid, *rest):
+        mesh, unoriented = found(two_sides, band, crossings, surface, grid, *rest)
         corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, 0.5], [0.3, 0.3, -0.5]]) * 0.5 * grid.spacing
         faces = np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 0, 4], [2, 1, 4], [0, 2, 4]]) + len(mesh.vertices)
         vertices = np.concatenate([mesh.vertices, corners + surface.points[0]])

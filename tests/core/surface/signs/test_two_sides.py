@@ -10,26 +10,26 @@ from core.field.blocks import Blocks
 from core.linalg import symmetric
 from core.progress import Progress
 from core.surface.signs.two_sides import _orientations, two_sided
-from core.surface.single import layer
-from core.surface.single.single_layer import sheet_between_sides
+from core.surface.single.layer import SingleLayer
 from tests import shapes
 
 
 @pytest.fixture
 def asked(monkeypatch):
     """A function of points and settings: what `two_sided` is given, or would be, in a run, and what it answers."""
+    between = SingleLayer.between.func
 
     def ask(points, **settings):
         seen = {}
 
-        def look(values, band, crossings, sides, *rest):
-            given = values, band, crossings, *rest[:2]
-            seen.update(zip(("values", "band", "crossings", "surface", "grid"), given, strict=True))
-            signed = two_sided(*given, Progress())
-            seen["signed"] = signed.dense() if isinstance(signed, Blocks) else signed
-            return sheet_between_sides(values, band, crossings, sides, *rest)
+        def look(of):
+            names = {"values": "values", "band": "band", "crossings": "crossings", "surface": "local", "grid": "grid"}
+            given = {name: getattr(of, own) for name, own in names.items()}
+            signed = two_sided(**given, progress=Progress())
+            seen.update(given, signed=signed.dense() if isinstance(signed, Blocks) else signed)
+            return between(of)
 
-        monkeypatch.setattr(layer, "sheet_between_sides", look)
+        monkeypatch.setattr(SingleLayer, "between", property(look))
         reconstruct(points, Settings(**{"resolution": 48, "surface": "single", "denoise": 0, **settings}))
         return seen
 
