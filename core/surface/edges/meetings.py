@@ -66,6 +66,10 @@ class Meetings:
         """Whether sheets run so close beside each other that single layers are torn there."""
         return not self.few and bool(self._share(self.beside) > _BESIDE)
 
+    def adds_to(self, others: "Meetings") -> bool:
+        """Whether more samples are at these meetings than at others, and not so few that they may be chance."""
+        return bool((self.at & ~others.at).mean() > _FEW)
+
     def with_beside(self, others: np.ndarray) -> "Meetings":
         """These and samples (n,) bool known to be beside another sheet; these alone where so few are new that they may
         be chance."""

@@ -21,6 +21,8 @@ from ..signs.two_sides import two_sided
 from .single_layer import BETTER, ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
 from .thin_walls import with_thin_walls
 
+_SHOWN = 0.005  # of the samples, that one layer shows and another misses; fewer may be chance
+
 
 @dataclass(frozen=True)
 class SingleLayer:
@@ -113,12 +115,17 @@ class SingleLayer:
         return self.meetings.side_by_side and self.fit[0] > ROUGH
 
     def told_apart(self) -> "SingleLayer":
-        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so. It never
-        takes the place of what lies between two sides, which has no lines; it may have some, along creases."""
+        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so, or less so
+        and misses fewer samples. It never takes the place of what lies between two sides, which has no lines; it may
+        have some, along creases."""
         if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
-        return other if other.misfit[0] < BETTER * self.misfit[0] else self
+        if not other.meetings.adds_to(self.meetings):
+            return self
+        (worst, missed), (others_worst, others_missed) = self.misfit, other.misfit
+        shows_more = missed - others_missed > _SHOWN
+        return other if others_worst < (1 if shows_more else BETTER) * worst else self
 
     def with_thin_walls(self) -> tuple[Mesh, int]:
         """The single layer, with pieces of the double cover around thin walls where it is rough and has no two sides;

@@ -61,9 +61,12 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
     rim = counts[edge[face]] != 2
     open_patch = np.bincount(label, (counts[edge[face]] == 1).any(axis=1)) > 0
     order = np.argsort(label, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(order) else []
+    first = np.flatnonzero(np.diff(label[order], prepend=-1))
+    parts = np.split(order, first[1:])
     off = surface.project(corners.mean(axis=1)).distance
-    cost = np.array([off[p].max() + _SIZE * np.linalg.norm(np.ptp(corners[p].reshape(-1, 3), axis=0)) for p in parts])
+    low = np.minimum.reduceat(corners.min(axis=1)[order], first)
+    high = np.maximum.reduceat(corners.max(axis=1)[order], first)
+    cost = np.maximum.reduceat(off[order], first) + _SIZE * np.linalg.norm(high - low, axis=1)
     dropped, left = np.zeros(len(face), bool), counts.copy()
 
     def drop(part):

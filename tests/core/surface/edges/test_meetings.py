@@ -133,6 +133,25 @@ def test_few_samples_show_no_sheets_side_by_side(at, beside, expected):
     assert meet.side_by_side is expected
 
 
+@pytest.mark.parametrize(("more", "expected"), [(5, False), (6, True)])
+def test_few_samples_more_at_meetings_or_beside_others_may_be_chance(more, expected):
+    """Of 1,000, at most five, none of them at meetings before."""
+    number, none = np.arange(1000), np.zeros(1000, bool)
+    meet = Meetings(number < 100, none, number < 50, none)
+    others = number < 50 + more
+    assert (meet.with_beside(others) is not meet) == expected
+    assert Meetings(number < 100 + more, none, none, none).adds_to(meet) == expected
+    assert not Meetings(number < 10, none, others, none).adds_to(meet)
+
+
+def test_samples_beside_others_are_at_meetings():
+    number, none = np.arange(1000), np.zeros(1000, bool)
+    meet = Meetings(number < 100, none, number < 50, number > 800).with_beside(number >= 900)
+    np.testing.assert_array_equal(meet.at, (number < 100) | (number >= 900))
+    np.testing.assert_array_equal(meet.beside, (number < 50) | (number >= 900))
+    np.testing.assert_array_equal(meet.passing, number > 800)
+
+
 def test_samples_that_are_few_of_those_around_them_show_no_line():
     """Along a row of samples, each beside the twelve next to it."""
     n = 200

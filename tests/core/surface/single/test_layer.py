@@ -5,6 +5,7 @@ import pytest
 
 from core import Settings, reconstruct
 from core.surface.meshing.misfit import distances
+from core.surface.single import layer
 from core.surface.single.layer import SingleLayer
 from tests import shapes
 
@@ -34,7 +35,42 @@ def test_a_glued_roll_shows_both_its_turns(resolution):
 
 
 def test_without_the_room_of_samples_it_does_not(monkeypatch):
-    monkeypatch.setattr(SingleLayer, "told_apart", lambda layer: layer)
+    monkeypatch.setattr(SingleLayer, "told_apart", lambda found: found)
     run = single(glued_roll())
     assert off(run).mean() > 0.012
     assert (off(run) > 0.5).mean() > 0.005
+
+
+@pytest.mark.parametrize(
+    ("other", "taken"),
+    [
+        ((0.49, 0.03), True),
+        ((0.51, 0.03), False),
+        ((0.99, 0.024), True),
+        ((0.99, 0.026), False),
+        ((1.01, 0.0), False),
+    ],
+)
+def test_what_room_tells_apart_is_taken_if_far_less_rough_or_if_it_shows_more(other, taken, monkeypatch):
+    """Beside one of misfit 1 that misses 3 % of the samples."""
+    told, seen = SingleLayer.told_apart, []
+
+    def look(found):
+        seen.append((found, told(found)))
+        return seen[-1][1]
+
+    monkeypatch.setattr(SingleLayer, "misfit", property(lambda found: other if found.by_room else (1.0, 0.03)))
+    monkeypatch.setattr(SingleLayer, "told_apart", look)
+    single(glued_roll())
+    [(plain, chosen)] = seen
+    assert not plain.by_room
+    assert chosen.by_room == taken
+
+
+@pytest.mark.parametrize(("tells", "layers"), [(True, 2), (False, 1)])
+def test_no_other_layer_is_made_where_room_tells_no_more_sheets(tells, layers, monkeypatch):
+    made, cross, meet = [], layer.find_crossings, layer.find_meetings
+    monkeypatch.setattr(layer, "find_crossings", lambda *given: made.append(given) or cross(*given))
+    monkeypatch.setattr(layer, "find_meetings", lambda *given: meet(*given[:2], by_room=given[2] and tells))
+    single(glued_roll())
+    assert len(made) == layers
