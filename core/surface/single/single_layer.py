@@ -1,6 +1,7 @@
 """The single layer: one sheet, open where the surface is open, non-manifold where sheets meet."""
 
 from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -10,6 +11,8 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...progress import Progress
+from ...settings import Settings
+from ..double.double_cover import double_cover
 from ..edges.crossings import Crossings
 from ..edges.meetings import Meetings
 from ..mesh import Mesh
@@ -17,7 +20,7 @@ from ..meshing.centring import centred
 from ..meshing.misfit import chamfer, misfit
 from ..signed import signed_mesh
 from ..signs.sides import Sides, patch_lengths, patches
-from ..signs.two_sides import LONG
+from ..signs.two_sides import LONG, two_sided
 from ..signs.zero_set import sharpened
 from .dual_contour import dual_contour
 from .holes import fill_pinholes
@@ -34,6 +37,20 @@ BETTER = 0.5  # times the misfit of one mesh, below which another is taken
 _MENDED = 2  # times, since holes may show where scraps are gone
 _BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
 _BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
+
+
+def single_layer(
+    values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
+) -> tuple[Mesh, int]:
+    """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
+    progress = Progress.of(progress)
+    two_sides = cache(lambda: two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.1)))
+    between = sheet_between_sides(two_sides, band, crossings, sides, surface, grid, progress.part(0.1, 0.3))
+    cover = partial(double_cover, values, band, surface, grid, Settings().offset)
+    sheet = sheet_of_sides(values, crossings, sides, surface, grid, between, cover, progress.part(0.3, 0.5))
+    if sheet is not None:
+        return sheet, 0
+    return sheet_of_crossings(two_sides, band, crossings, surface, grid, between, cover, progress.part(0.5, 1.0))
 
 
 def sheet_between_sides(
