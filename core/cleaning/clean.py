@@ -11,6 +11,8 @@ from .depth_steps import between_steps
 from .outliers import find_outliers
 from .positions import denoise
 
+_FAR = 2.0  # times as long as the box around the rest is one around strays, too, of which it is said, at least
+
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
     """Samples without strays, noise and steps of depth, and what was done about them, in input units, for the report.
@@ -23,13 +25,23 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     if settings.outliers:
         dropped = find_outliers(samples.points, progress.part(0.1, 0.3))
     if dropped.any():
-        samples = samples.without(dropped, f"{dropped.sum()} of {len(dropped)} points dropped as outliers")
+        samples = samples.without(dropped, _said_of_dropped(dropped, samples.points))
     spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
     moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 1.0))
     if done:
         samples = samples.moved(moved)
         done |= {name: done[name] * samples.scale for name in ("noise", "mean_move")}
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
+
+
+def _said_of_dropped(dropped, points):
+    """How many were dropped; and if the box around them and the rest is much larger, that its cells are, too."""
+    said = f"{dropped.sum()} of {len(dropped)} points dropped as outliers"
+    every, rest = (np.ptp(some, axis=0).max() for some in (points, points[~dropped]))
+    if every < _FAR * rest:
+        return said
+    larger = f"the grid's cells would be {every / rest:.2g} times as large with them"
+    return f"{said}, some so far from the rest that {larger}; with outliers=False they stay"
 
 
 def _off_steps_of_depth(samples, strength, progress):

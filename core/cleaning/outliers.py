@@ -1,4 +1,4 @@
-"""Stray samples: scattered through space, hovering beside a surface, or in detached clouds.
+"""Stray samples: scattered through space, hovering beside a surface, in detached clouds, or far from all others.
 
 A sample is never judged by its density alone, which would eat wires, rims and sparsely scanned parts: it must also
 stand off the plane of its neighbours, or lie among samples that form no surface, or off all wires.
@@ -11,6 +11,7 @@ from ..given_arrays import finite_points
 from ..neighbourhoods.quadrics import fit_quadrics
 from ..progress import Progress
 from .detached import detached_clouds
+from .far_parts import far_parts
 from .off_wires import off_wires
 from .surroundings import SHEET, Surroundings, thickness
 
@@ -38,6 +39,7 @@ _HOVERING_FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
 def find_outliers(points, progress=None) -> np.ndarray:
     """(n,) bool: which samples (n,3), float64 and finite, are strays.
 
+    - far: few, and further from all the others than these are from each other;
     - beside a surface: lonelier than its neighbours and off their plane, or far lonelier;
     - proud, where there are more than a few such: a little lonely and off the neighbours' plane where none of them is;
     - scattered: sparse against the whole cloud, where most sparse samples around form no surface, nor all of them one;
@@ -58,7 +60,8 @@ def find_outliers(points, progress=None) -> np.ndarray:
         kept = np.flatnonzero(~stray)
         around = Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > max(_DIRTY * len(points), _LONE)
-        found = _beside(around, _STRICT if dirty else 1.0) | _scattered(around, part.part(0.6, 0.7))
+        found = far_parts(around.points) | _beside(around, _STRICT if dirty else 1.0)
+        found |= _scattered(around, part.part(0.6, 0.7))
         part(0.7)
         found |= detached_clouds(around, part.part(0.7, 0.8))
         among_wires = off_wires(around, _LONELY)

@@ -26,6 +26,13 @@ def test_without_strays_everything_is_as_if_they_had_never_been():
     assert any("3 of 2003 points dropped as outliers" in warning for warning in cleaned.warnings)
 
 
+def test_it_is_said_by_how_much_far_strays_enlarge_the_cells():
+    [far] = clean(prepare_samples(np.vstack([CLEAN, STRAYS])))[0].warnings
+    [near] = clean(prepare_samples(np.vstack([CLEAN, STRAYS / 6])))[0].warnings
+    assert "cells would be 8 times as large" in far
+    assert near == "3 of 2003 points dropped as outliers"
+
+
 def test_switched_off_they_stay():
     points = np.vstack([CLEAN, STRAYS])
     cleaned, done = clean(prepare_samples(points), Settings(outliers=False, denoise=0))

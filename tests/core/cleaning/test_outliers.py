@@ -145,6 +145,16 @@ def test_a_detached_cloud_is_found_and_a_detached_sheet_is_not():
     assert not find_outliers(with_strays(flat)[0]).any()
 
 
+@pytest.mark.parametrize(("count", "far", "dropped"), [(80, 9, True), (80, 2.5, False), (130, 9, False)])
+def test_few_samples_go_that_are_further_from_all_others_than_these_reach(count, far, dropped):
+    """Though they are two surfaces of their own; beside 5000 others 80 are few, and 130 are not."""
+    flat = np.random.default_rng(1).uniform(-0.2, 0.2, (count, 3)) * [1, 1, 0]
+    flat[: count // 2] += [far, 0, 0]
+    flat[count // 2 :] -= [0, far, far]
+    points, stray = with_strays(flat)
+    np.testing.assert_array_equal(find_outliers(points), stray & dropped)
+
+
 @pytest.mark.parametrize("noise", [0.01, 0.025])
 def test_a_noisy_sheet_of_its_own_stays(noise):
     rng = np.random.default_rng(1)
