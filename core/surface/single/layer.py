@@ -92,8 +92,11 @@ class SingleLayer:
     @cached_property
     def sheet(self) -> tuple[Mesh, int]:
         """That of any surface, and the number of its edges that cannot be wound alike."""
-        if self.of_sides is not None:
-            return self.of_sides, 0
+        found = (self.of_sides, 0) if self.of_sides is not None else self._sheet_of_crossings()
+        vars(self).pop("two_sides", None)  # as large as the field, and not asked for again
+        return found
+
+    def _sheet_of_crossings(self):
         part = self.progress.part(0.5, 0.7, "single layer")
         given = self.band, self.crossings, self.local, self.grid, self.between
         return sheet_of_crossings(lambda: self.two_sides, *given, self.cover, part)
