@@ -119,15 +119,16 @@ class SingleLayer:
 
     def told_apart(self) -> "SingleLayer":
         """This, or where it is rough, the one with sheets told apart by their room, if that is far less so, or less so
-        and misses fewer samples. It never takes the place of what lies between two sides, which has no lines; it may
-        have some, along creases."""
+        and misses fewer samples; the latter not if it is torn no more where this is, which the double cover stands in
+        for. It never takes the place of what lies between two sides, which has no lines; it may have some, along
+        creases."""
         if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
         if not other.meetings.adds_to(self.meetings):
             return self
         (worst, missed), (others_worst, others_missed) = self.misfit, other.misfit
-        shows_more = missed - others_missed > _SHOWN
+        shows_more = missed - others_missed > _SHOWN and (worst > 1) == (others_worst > 1)
         return other if others_worst < (1 if shows_more else BETTER) * worst else self
 
     def with_thin_walls(self) -> tuple[Mesh, int]:

@@ -42,24 +42,27 @@ def test_without_the_room_of_samples_it_does_not(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("other", "taken"),
+    ("rough", "other", "taken"),
     [
-        ((0.49, 0.03), True),
-        ((0.51, 0.03), False),
-        ((0.99, 0.024), True),
-        ((0.99, 0.026), False),
-        ((1.01, 0.0), False),
+        (1.0, (0.49, 0.03), True),
+        (1.0, (0.51, 0.03), False),
+        (1.0, (0.99, 0.024), True),
+        (1.0, (0.99, 0.026), False),
+        (1.0, (1.01, 0.0), False),
+        (1.6, (1.5, 0.024), True),
+        (1.6, (0.9, 0.0), False),
+        (1.6, (0.7, 0.03), True),
     ],
 )
-def test_what_room_tells_apart_is_taken_if_far_less_rough_or_if_it_shows_more(other, taken, monkeypatch):
-    """Beside one of misfit 1 that misses 3 % of the samples."""
+def test_what_room_tells_apart_is_taken_if_far_less_rough_or_if_it_shows_more(rough, other, taken, monkeypatch):
+    """Beside a layer that misses 3 % of the samples; a torn one gives way to one that is not at half its misfit."""
     told, seen = SingleLayer.told_apart, []
 
     def look(found):
         seen.append((found, told(found)))
         return seen[-1][1]
 
-    monkeypatch.setattr(SingleLayer, "misfit", property(lambda found: other if found.by_room else (1.0, 0.03)))
+    monkeypatch.setattr(SingleLayer, "misfit", property(lambda found: other if found.by_room else (rough, 0.03)))
     monkeypatch.setattr(SingleLayer, "told_apart", look)
     single(glued_roll())
     [(plain, chosen)] = seen
