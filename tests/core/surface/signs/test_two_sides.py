@@ -23,10 +23,10 @@ def asked(monkeypatch):
         seen = {}
 
         def look(of):
-            names = {"values": "values", "band": "band", "crossings": "crossings", "surface": "local", "grid": "grid"}
-            given = {name: getattr(of, own) for name, own in names.items()}
-            signed = two_sided(**given, progress=Progress())
-            seen.update(given, signed=signed.dense() if isinstance(signed, Blocks) else signed)
+            given = of.values, of.band, of.crossings, of.local, of.grid
+            seen.update(zip(("values", "band", "crossings", "surface", "grid"), given, strict=True))
+            signed = two_sided(*given, Progress())
+            seen["signed"] = signed.dense() if isinstance(signed, Blocks) else signed
             return between(of)
 
         monkeypatch.setattr(SingleLayer, "between", property(look))
