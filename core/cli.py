@@ -6,6 +6,7 @@ import sys
 import threading
 from contextlib import contextmanager
 from dataclasses import asdict
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from .io.atomic import writable_folder
 from .io.npz import write_arrays
 from .io.ply import write_mesh, write_points
 from .io.points import READERS, read_points, read_scan
-from .io.report import report_json, write_report
+from .io.report import report_json, scan_of_report, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
 from .points import first_of_each, local_spacing, prepare_samples
@@ -44,7 +45,7 @@ example:
 exit status:
   0    done
   2    the scan, an option or the output folder cannot be used: one line on stderr says what and how to help it
-  3    the run would need more memory than it may have: the line names a resolution that fits
+  3    the run would need more memory than it may have: the line says what would help
   130  cancelled by Ctrl-C or a request to end (SIGTERM); no file is left half-written
 
 With --json, stdout holds one JSON document and nothing else: the report, or {{"error": "..."}} beside the line on
@@ -71,10 +72,9 @@ number, with scan_ before its name where it has one of those two.
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) and return the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    in_main = threading.current_thread() is threading.main_thread()  # other threads cannot set handlers
-    previous = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main else None
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler) if _in_main_thread() else None
     try:
-        given = _parser().parse_args(arguments)
+        given = _parsed(arguments)
         given.run(given)
         return DONE
     except Cancelled as error:
@@ -92,8 +92,13 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         return _fail(f"{error.filename}: {error.strerror}; see that it is there and yours", BAD_INPUT, arguments)
     finally:
-        if in_main:
+        if _in_main_thread():
             signal.signal(signal.SIGTERM, previous)
+
+
+def _in_main_thread():
+    """Others cannot set handlers of signals."""
+    return threading.current_thread() is threading.main_thread()
 
 
 def _fail(error, status, arguments):
@@ -111,6 +116,19 @@ class _Parser(argparse.ArgumentParser):
         raise SettingsError(f"{message}; see {self.prog} --help")
 
 
+def _parsed(arguments):
+    """What was given. Raises :class:`SettingsError` for what no option takes, with the option that may be meant."""
+    given, unknown = _parser().parse_known_args(arguments)
+    if unknown:
+        names = vars(given).keys() - {"scan", "run", "command"}
+        meant = get_close_matches(unknown[0].partition("=")[0], sorted(f"--{name}" for name in names), 1)
+        raise SettingsError(
+            f"unrecognized: {' '.join(unknown)}{f' (is {meant[0]} meant?)' if meant else ''}; {given.command} takes "
+            f"one scan at a time, and the options of {PROGRAM} {given.command} --help"
+        )
+    return given
+
+
 def _parser():
     layout = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
@@ -123,20 +141,20 @@ def _parser():
     command = commands.add_parser(
         "reconstruct", help=text, description=text, epilog=_OUTPUTS, formatter_class=layout, allow_abbrev=False
     )
-    command.add_argument("scan", metavar="SCAN", type=Path, help=formats)
-    command.add_argument("-o", "--output", metavar="OUT", type=Path, required=True, help="folder for the results")
+    command.add_argument("scan", metavar="SCAN", type=_path, help=formats)
+    command.add_argument("-o", "--output", metavar="OUT", type=_path, required=True, help="folder for the results")
     _add_settings(command, options())
     command.add_argument("--gradient", action="store_true", help="also write the grid gradient into SCAN.vdb")
     command.add_argument("--arrays", action="store_true", help="also write SCAN.npz for other programs")
     command.add_argument("--json", action="store_true", help="print the report and the files written as JSON")
-    command.set_defaults(run=_reconstruct)
+    command.set_defaults(run=_reconstruct, command="reconstruct")
 
     text = "say what a scan holds and how large a cell would be"
     command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
-    command.add_argument("scan", metavar="SCAN", type=Path, help=formats)
+    command.add_argument("scan", metavar="SCAN", type=_path, help=formats)
     _add_settings(command, {name: options()[name] for name in ("resolution", "band", "surface")})
     command.add_argument("--json", action="store_true", help="print as JSON")
-    command.set_defaults(run=_info)
+    command.set_defaults(run=_info, command="info")
     return parser
 
 
@@ -162,6 +180,12 @@ def _add_settings(parser, fields):
         )
 
 
+def _path(text):
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty; give a path")
+    return Path(text)
+
+
 def _number(text):
     """A number where `text` is one; else the text, for Settings to refuse."""
     for kind in (int, float):
@@ -175,6 +199,8 @@ def _number(text):
 def _reconstruct(given):
     settings = Settings(**{name: getattr(given, name) for name in options()})
     points, carried = read_scan(given.scan)
+    if given.output.suffix.lower() in (*READERS, _VOLUME, _REPORT) and not given.output.exists():
+        raise InputError(f"{given.output} is to be a folder, in which files are named after the scan; give its name")
     folder = writable_folder(given.output)
     _spare(given.scan, folder, given.arrays)
     with _progress() as progress:
@@ -186,11 +212,14 @@ def _reconstruct(given):
 
 
 def _spare(scan, folder, arrays):
-    """Raise :class:`InputError` where a file that is to be written is the scan itself."""
+    """Raise :class:`InputError` where a file that is to be written is the scan itself, or a result of another scan."""
     for ending in (_POINTS, _VOLUME, *_MESHES.values(), *([_ARRAYS] if arrays else []), _REPORT):
         path = folder / f"{scan.stem}{ending}"
         if path.exists() and path.samefile(scan):
             raise InputError(f"{path} would replace the scan, which is that file; give another folder for the results")
+    other = scan_of_report(folder / f"{scan.stem}{_REPORT}")
+    if other and Path(other).is_file() and not Path(other).samefile(scan):
+        raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
 
 
 @contextmanager
@@ -211,7 +240,8 @@ def _progress():
             bar.update(fraction - bar.n)
         return not pressed
 
-    previous = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    numbers = (signal.SIGINT, signal.SIGTERM) if _in_main_thread() else ()
+    previous = {number: signal.signal(number, interrupt) for number in numbers}
     try:
         with tqdm(total=1.0, bar_format=_BAR, miniters=0, disable=None, leave=False) as bar:
             yield report
@@ -235,7 +265,7 @@ def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
         writers[_ARRAYS] = partial(write_arrays, result=result)
 
     summary = folder / f"{scan.stem}{_REPORT}"
-    report = {**result.report, "scan": scan, "files": [], "warnings": list(result.report["warnings"])}
+    report = {**result.report, "scan": scan.absolute(), "files": [], "warnings": list(result.report["warnings"])}
     for ending in (_VOLUME, *_MESHES.values(), _ARRAYS):
         if ending not in writers and (path := folder / f"{scan.stem}{ending}").exists():
             report["warnings"].append(f"{path} is not of this run, which does not write it")

@@ -1,7 +1,7 @@
 """Build and validate the extension's zip in dist/.
 
-    python scripts/build_extension.py                 one zip that uses the SciPy it finds in Blender's Python
-    python scripts/build_extension.py --wheels        one zip per platform, each carrying SciPy for Blender 4.5 to 5.2
+    .venv/bin/python scripts/build_extension.py             one zip, which uses the SciPy of Blender's Python
+    .venv/bin/python scripts/build_extension.py --wheels    one per platform, with SciPy for Blender 4.5 to 5.2
 
 Needs the `bpy` package in the running Python, whose build tool it calls, or a Blender by --blender PATH.
 """
@@ -15,6 +15,8 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+
+SHIPPED = "blender_manifest.toml", "__init__.py", "LICENSE", "README.md", "core", "vad_addon"
 
 SCIPY = {"3.11": "1.17.1", "3.13": "1.18.1"}  # Blender 4.5-5.0 and 5.1-5.2
 PLATFORMS = {
@@ -63,20 +65,14 @@ def _builder(blender):
 
 
 def _stage(stage):
-    """Copy the project's own files, and nothing a checkout gathers over time; the manifest excludes the rest."""
-    for path in _project_files():
-        target = stage / path
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / path, target)
-
-
-def _project_files():
-    if (ROOT / ".git").exists():
-        listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-        names = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout
-        return [Path(name) for name in names.split("\0") if name and (ROOT / name).is_file()]
-    files = (path.relative_to(ROOT) for path in ROOT.rglob("*") if path.is_file())
-    return [path for path in files if not any(part.startswith(".") for part in path.parts)]
+    """Copy what the extension needs, and nothing that lies beside it, such as a user's scans and results."""
+    stage.mkdir()
+    for name in SHIPPED:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, stage / name, ignore=shutil.ignore_patterns("__pycache__", ".*"))
+        else:
+            shutil.copy2(source, stage)
 
 
 def _add_wheels(stage):

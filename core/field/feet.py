@@ -22,7 +22,8 @@ _CHUNK = 1 << 17
 
 @dataclass(frozen=True)
 class Feet:
-    """Foot points and the discs that they stand for.
+    """Foot points and the discs that they stand for, with positions relative to the origin of the grid, so that single
+    precision is as fine wherever the samples lie.
 
     centres, normals : (3,s) float32, unit normals     radius : (s,) float32, 0 on rims
     """
@@ -69,8 +70,8 @@ class Feet:
 
     def in_cells(self, grid: Grid) -> "Feet":
         """The same in the grid's index space: node (i,j,k) lies at (i,j,k)."""
-        centres = (self.centres - grid.origin[:, None]) / grid.spacing
-        return Feet(centres.astype(np.float32), self.normals, self.radius / np.float32(grid.spacing))
+        cell = np.float32(grid.spacing)
+        return Feet(self.centres / cell, self.normals, self.radius / cell)
 
 
 def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, progress) -> tuple[np.ndarray, Feet]:
@@ -88,7 +89,8 @@ def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, prog
     kept[doubtful] = again.distance <= _SETTLED * grid.spacing
     node, near, feet = node[kept], near[kept], feet[kept]
     radius = np.where(near.past_rim, 0.0, _RADIUS * grid.spacing)
-    return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in (feet, near.direction, radius)))
+    parts = feet - grid.origin, near.direction, radius
+    return node, Feet(*(np.ascontiguousarray(each.T, np.float32) for each in parts))
 
 
 def no_farther_than_feet(projected: np.ndarray, to_feet: np.ndarray, grid: Grid) -> np.ndarray:

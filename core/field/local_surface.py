@@ -6,9 +6,11 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..given_arrays import finite_points, spacing_of
 from ..linalg import COMPONENTS
 from ..neighbourhoods.close_sheets import sheet_room
 from ..neighbourhoods.cloud import Cloud
+from ..normals.known import known_normals
 from ..progress import Progress
 from .curvature import bending
 from .grid import Grid
@@ -81,9 +83,12 @@ class LocalSurface:
 
 
 def fit_local_surface(points, normals, confidence, spacing, bridge: float, progress=None) -> LocalSurface:
-    """Patches and rims of samples (n,3) with axes (n,3), their confidence (n,) and local spacing (n,); gaps up to
-    `bridge` spacings are closed."""
-    progress = Progress.of(progress)
+    """Patches and rims of distinct samples (n,3) with axes (n,3) of any length, their confidence (n,) in [0,1] and
+    local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Raises :class:`InputError` for
+    other shapes, what is not finite, axes without a direction and spacings not above 0."""
+    progress, points = Progress.of(progress), finite_points(points, least=2)
+    normals, confidence = known_normals((normals, confidence), len(points), slice(None))
+    spacing = spacing_of(points, spacing)
     cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))
     room = sheet_room(cloud, progress.part(0.1, 0.2))
     bend = bending(cloud, room, progress.part(0.2, 0.5))

@@ -38,7 +38,7 @@ def banded_field(surface: LocalSurface, grid: Grid, width: float, progress=None)
     block = np.unique(np.ravel_multi_index(tuple((groups.corner // SIDE).T), table_shape(grid.shape)))
     values = blocks_of(grid.shape, block, np.float32(width * grid.spacing))
     for rows in progress.part(0.75, 0.8).chunks(len(node), _PIECE):
-        to_feet = feet.distances(grid.positions(node[rows]))
+        to_feet = feet.distances(grid.positions(node[rows]) - grid.origin)
         values.put(node[rows], no_farther_than_feet(near.distance[rows], to_feet, grid))
     carried_outwards(values, groups, feet, surface, width, progress.part(0.8, 1.0))
     return values.merged(), NearBand(grid.shape, node, near.step, near.past_rim, near.sample), feet

@@ -46,7 +46,8 @@ def _held(groups, feet, surface, width, progress):
         part = groups[rows]
         away = np.linalg.norm(part.middles - surface.points[part.sample], axis=1)
         if count:
-            to_feet, held[rows] = feet.tree.query(part.middles, np.arange(1, count + 1), workers=-1)
+            middles = part.middles - groups.grid.origin
+            to_feet, held[rows] = feet.tree.query(middles, np.arange(1, count + 1), workers=-1)
             away = np.minimum(away, to_feet[:, 0])
         near.append(rows.start + np.flatnonzero(away <= limit))
     return held, np.concatenate(near)
@@ -60,7 +61,7 @@ def _measure(values, limit, groups, feet, surface, held, lattice, rows):
         x = groups.grid.positions(node)
         distance = np.linalg.norm(x - surface.points[groups.sample[own]], axis=1)
         if held.shape[1]:
-            x = np.ascontiguousarray(x.T, np.float32)
+            x = np.ascontiguousarray((x - groups.grid.origin).T, np.float32)
             among = np.concatenate(held[_beside(lattice, own, octant)].transpose(0, 2, 1))
             distance = np.minimum(distance, feet.distance(x, feet.closest(x, among)))
         values.put(node, np.minimum(distance, limit))

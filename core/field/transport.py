@@ -8,7 +8,7 @@ Processing 14, 1980), and look where they fall on the plane of its disc. The dis
 alone: the least of many discs' is too small where the feet scatter.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -30,6 +30,7 @@ _PIECE = 1 << 15  # blocks
 def transport(grid: Grid, node: np.ndarray, feet: Feet, progress=None) -> np.ndarray:
     """Distances at all nodes of the grid, float32 of its shape, from the feet that some nodes (s,) have, by their flat
     indices in ascending order."""
+    grid = replace(grid, origin=np.zeros(3))  # the feet are relative to it
     progress, slabs = Progress.of(progress), _slabs(grid, _SLAB)
     row = _close_feet(grid, node, feet, progress.part(0.0, 0.8))
     values = np.empty(grid.shape, np.float32)
@@ -142,7 +143,7 @@ class _Held:
         x, own = [along.take(i) for along, i in zip(_axes(grid, slab), at, strict=True)], row[slab][at]
         normal = [each.take(own) for each in feet.normals]
         height = dots(feet.offsets(x, own), normal)
-        cells = [(x[a] - height * normal[a] - np.float32(grid.origin[a])) / np.float32(grid.spacing) for a in range(3)]
+        cells = [(x[a] - height * normal[a]) / np.float32(grid.spacing) for a in range(3)]
         below = [np.rint(each).clip(0, n - 1).astype(np.int32) for each, n in zip(cells, grid.shape, strict=True)]
         other = number[tuple(below)]
         row[slab][at] = feet.closest(x, [own, np.where(other >= 0, other, own)])

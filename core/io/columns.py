@@ -30,16 +30,33 @@ def named_columns(path, names: list[str]) -> dict[str, int]:
     return {axis: columns.pop(axis) for axis in XYZ} | columns
 
 
-def unnamed_columns(path, count: int) -> dict[str, int]:
-    """The same where nothing names them: what scanners write to .pts files, else the coordinates alone."""
-    further = _OF_SCANNERS.get(count, ()) if path.suffix.lower() == ".pts" else ()
+def unnamed_columns(path, first: list[str]) -> dict[str, int]:
+    """The same where nothing names them, by the cells of the first row: what scanners write to .pts files, colours
+    where just the three cells after the coordinates could be bytes, see :func:`are_colours`, else the coordinates."""
+    further = _OF_SCANNERS.get(len(first), ()) if path.suffix.lower() == ".pts" else ()
+    if not further and [_may_be_byte(cell) for cell in first[3:7]] in ([True] * 3, [True] * 3 + [False]):
+        further = COLOURS
     return XYZ | {name: column for column, name in enumerate(further, start=3)}
+
+
+def _may_be_byte(cell):
+    return cell.isdecimal() and len(cell) <= 3 and int(cell) <= 255
+
+
+def are_colours(values: np.ndarray) -> bool:
+    """Whether numbers (n,3) without a name are colours: whole ones from 0 to 255, and not all 0 or 1, as normals of
+    walls are."""
+    return bool(_are_bytes(values) and (values > 1).any())
+
+
+def _are_bytes(values):
+    return ((values >= 0) & (values <= 255) & (values % 1 == 0)).all()
 
 
 def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The attributes, colours as uint8 where they are whole numbers from 0 to 255."""
     colours = {name: values for name, values in attributes.items() if name in COLOURS}
-    if all(((values >= 0) & (values <= 255) & (values % 1 == 0)).all() for values in colours.values()):
+    if all(map(_are_bytes, colours.values())):
         attributes = attributes | {name: values.astype(np.uint8) for name, values in colours.items()}
     return attributes
 

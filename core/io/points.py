@@ -61,7 +61,9 @@ def read_scan(path: str | os.PathLike) -> tuple[np.ndarray, dict[str, np.ndarray
     .ply                    : every property of the vertices that is one number (red, green, blue, intensity, ...), as
                               stored
     .xyz, .pts, .txt, .csv  : every further column with a name and a number in each row, float64, colours up to 255
-                              uint8; in .pts files of four or seven columns intensity, red, green and blue need no names
+                              uint8. Without names: in .pts files of four or seven columns intensity, red, green and
+                              blue; else red, green and blue where three whole numbers up to 255 follow the coordinates
+                              in every row
 
     Normals are left out: they belong to the surface the points came from.
     """

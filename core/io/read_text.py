@@ -11,7 +11,7 @@ from typing import TextIO
 import numpy as np
 
 from ..errors import InputError
-from .columns import XYZ, named_columns, unnamed_columns, with_colours_in_bytes
+from .columns import COLOURS, XYZ, are_colours, named_columns, unnamed_columns, with_colours_in_bytes
 from .not_a_number import spelt_plainly
 
 _COMMENT = re.compile(r"(?:^|(?<=[\s\d.,;]))(?:#|//)(?![,;\t])")  # not the mark in a name, as in "Point#,X,Y,Z"
@@ -76,8 +76,9 @@ def _read(path, wanted=None):
             first = next(rows, "")
         elif not any(map(_is_number, _split(first))):
             header, first = first, next(rows, "")
-        columns = _columns(path, header, lines.comment, _split(first))
+        columns, named = _columns(path, header, lines.comment, _split(first))
         further = list(columns)[3:]
+        guessed = not named and further == list(COLOURS)
         columns = {name: c for name, c in columns.items() if name in XYZ or wanted is None or name in wanted}
         if _has_decimal_commas(first):
             first, rows = _with_points(first), map(_with_points, rows)
@@ -85,18 +86,21 @@ def _read(path, wanted=None):
     if claimed and sum(claimed) != len(table):
         where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
         raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(table)} follow; is it cut off?")
-    return table[:, :3], dict(zip(list(columns)[3:], table.T[3:], strict=True)), further
+    attributes = dict(zip(list(columns)[3:], table.T[3:], strict=True))
+    if guessed and not (attributes and are_colours(table[:, 3:])):
+        attributes, further = {}, []
+    return table[:, :3], attributes, further
 
 
 def _columns(path, header, comment, values):
-    """The columns of numbers, by name: x, y and z, then those with one among the `values` of the first row. A comment
-    before it that names as many as there are is a header, as other programs write it."""
-    named = _split(_UNIT.sub("", comment if header is None else header))
-    if header is not None or (len(named) == len(values) and XYZ.keys() <= {name.lower() for name in named}):
-        columns = named_columns(path, named)
-    else:
-        columns = unnamed_columns(path, len(values))
-    return {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and _is_number(values[c]))}
+    """The columns of numbers, by name: x, y and z, then those with one among the `values` of the first row; and whether
+    the names are the file's. A comment before it that names as many as there are is a header, as other programs write
+    it."""
+    names = _split(_UNIT.sub("", comment if header is None else header))
+    named = header is not None or (len(names) == len(values) and XYZ.keys() <= {name.lower() for name in names})
+    columns = named_columns(path, names) if named else unnamed_columns(path, values)
+    kept = {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and _is_number(values[c]))}
+    return kept, named
 
 
 def _rows_of_blocks(rows, claimed):

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,16 @@ def write_report(path: str | os.PathLike, report: dict) -> None:
     """Write :func:`report_json` of `report` as the file `path`."""
     with atomic_path(path) as temporary:
         temporary.write_text(report_json(report) + "\n", encoding="utf-8")
+
+
+def scan_of_report(path: str | os.PathLike) -> str | None:
+    """The scan that a report written as the file `path` is of; None where there is no such file, or another."""
+    try:
+        report = json.loads(Path(path).read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+    scan = report.get("scan") if isinstance(report, dict) else None
+    return scan if isinstance(scan, str) else None
 
 
 def _plain(value):

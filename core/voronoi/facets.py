@@ -33,6 +33,7 @@ HEEDED = 2 * math.hypot(CLIP_RADIUS, REACH / 2)  # local spacings, radius of the
 
 _NEGLIGIBLE = 1e-9  # squared clip radii
 _JITTER = 1e-6  # local spacings
+_FARTHEST = 1e6  # half boxes, circumcentres of flat tetrahedra
 _CORNER_DISTANCE = 5.0  # half boxes; from 3 on the tetrahedron holds the box
 
 _TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
@@ -132,7 +133,8 @@ def _sides(sites, spacing, radius, block):
     members, count = block.members, len(block.members)
     spacing, own = spacing[members], np.isin(members, block.own, assume_unique=True)
     beyond = radius[block.own].max() if count < len(sites) else 0.0  # the outermost of all have nothing to heed there
-    sites = np.concatenate([sites[members], _corners(sites[members], beyond)])
+    sites = sites[members] - sites[members].mean(axis=0)  # a frame of their own, which takes no digits from distances
+    sites = np.concatenate([sites, _corners(sites, beyond)])
     delaunay = _tetrahedra(sites)
 
     touching = np.append(own, np.zeros(len(_TETRAHEDRON), bool))[delaunay.simplices].any(axis=1)
@@ -230,5 +232,6 @@ def _circumcentres(sites, simplices):
     flat = np.finfo(np.float64).tiny
     safe = np.where(np.abs(volume) < flat, np.where(positive, flat, -flat), volume)
     with np.errstate(over="ignore"):
-        offset = np.clip(numerator / (2 * safe[:, None]), -1e6, 1e6)
-    return origin + offset, positive
+        offset = numerator / (2 * safe[:, None])
+    farthest = _FARTHEST * np.abs(sites).max()
+    return origin + np.clip(offset, -farthest, farthest), positive

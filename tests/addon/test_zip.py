@@ -1,5 +1,6 @@
 """The zip that users install: what is in it, and that it runs where nothing else is."""
 
+import importlib
 import os
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,6 +39,23 @@ def test_the_zip_holds_the_two_packages_and_no_junk(archive):
     assert {"__init__.py", "blender_manifest.toml", "core/settings.py", "vad_addon/operators.py"} <= set(names)
     assert not [name for name in names if "__pycache__" in name or "/." in name]
     assert archive.stat().st_size < 1_000_000
+
+
+def test_what_lies_beside_the_project_is_not_shipped(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(SCRIPT.parent)
+    build = importlib.import_module("build_extension")
+    for name in (*build.SHIPPED[:4], "core/a.py", "vad_addon/b.py"):
+        (tmp_path / "checkout" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "checkout" / name).write_text("")
+    wanted = {path.relative_to(tmp_path / "checkout") for path in (tmp_path / "checkout").rglob("*.*")}
+    for name in ("scan.ply", "out/scan.vdb", "core/__pycache__/a.pyc", "vad_addon/.hidden"):
+        (tmp_path / "checkout" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "checkout" / name).write_text("")
+    monkeypatch.setattr(build, "ROOT", tmp_path / "checkout")
+    build._stage(tmp_path / "stage")
+    staged = {path.relative_to(tmp_path / "stage") for path in (tmp_path / "stage").rglob("*.*")}
+    assert staged == wanted
+    assert (tmp_path / "stage" / "LICENSE").exists()
 
 
 def test_one_version_everywhere():
@@ -71,19 +90,41 @@ INSTALL_AND_RUN = """
 """
 
 
+RUN_LATER = """
+    import sys
+
+    import bpy
+
+    bpy.ops.preferences.addon_enable(module="bl_ext.user_default.vad")
+    assert bpy.ops.vad.import_points(filepath=sys.argv[1]) == {"FINISHED"}
+    assert bpy.ops.vad.reconstruct(resolution=32) == {"FINISHED"}
+    print("objects:", sorted(obj.name for obj in bpy.context.scene.vad.result.objects))
+"""
+
+
 @pytest.mark.slow
-def test_the_installed_zip_runs_in_a_fresh_blender(archive, tmp_path):
-    script = tmp_path / "install_and_run.py"
-    script.write_text(textwrap.dedent(INSTALL_AND_RUN))
+def test_the_installed_zip_runs_in_a_fresh_blender_and_in_a_later_one(archive, tmp_path):
+    ran = run(INSTALL_AND_RUN, archive, tmp_path)
+    assert "objects: ['Scan field', 'Scan samples', 'Scan surface']" in ran.stdout
+    (volume,) = (tmp_path / "user").rglob("*.vdb")
+    assert f"volume: {volume}" in ran.stdout
+    points = np.random.default_rng(0).normal(size=(500, 3))
+    np.savetxt(tmp_path / "ball.xyz", points / np.linalg.norm(points, axis=1, keepdims=True))
+    ran = run(RUN_LATER, tmp_path / "ball.xyz", tmp_path)
+    assert "objects: ['ball field', 'ball samples', 'ball surface']" in ran.stdout
+
+
+def run(text, argument, folder):
+    """Runs the script `text` in a Blender of its own, whose files are in the folder."""
+    script = folder / "script.py"
+    script.write_text(textwrap.dedent(text))
     ran = subprocess.run(
-        [sys.executable, script, archive],
-        cwd=tmp_path,
-        env=os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+        [sys.executable, script, argument],
+        cwd=folder,
+        env=os.environ | {"BLENDER_USER_RESOURCES": str(folder / "user")},
         capture_output=True,
         text=True,
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert "objects: ['Scan field', 'Scan samples', 'Scan surface']" in ran.stdout
-    (volume,) = (tmp_path / "user").rglob("*.vdb")
-    assert f"volume: {volume}" in ran.stdout
     assert "Traceback" not in ran.stderr
+    return ran

@@ -225,6 +225,54 @@ def test_an_unusable_output_folder_is_refused_before_the_work(capsys, scan, call
     assert not calls
 
 
+@pytest.mark.parametrize("ending", [".ply", ".PLY", ".vdb", ".json"])
+def test_a_file_in_place_of_the_output_folder_is_refused(capsys, scan, calls, tmp_path, ending):
+    assert "is to be a folder" in refused(capsys, "reconstruct", scan, "-o", tmp_path / f"mesh{ending}")
+    assert not (tmp_path / f"mesh{ending}").exists()
+    (tmp_path / f"mesh{ending}").mkdir()
+    assert run(capsys, "reconstruct", scan, "-o", tmp_path / f"mesh{ending}")[0] == 0
+
+
+def test_empty_paths_are_refused(capsys, scan, calls, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "empty; give a path" in refused(capsys, "reconstruct", scan, "-o", "")
+    assert "empty; give a path" in refused(capsys, "reconstruct", "", "-o", "out")
+    assert not calls
+
+
+def test_results_of_another_scan_of_that_name_stay(capsys, scan, calls, tmp_path, monkeypatch):
+    """Whether its name has another ending or it lies in another folder, and again where the first scan is gone."""
+    monkeypatch.chdir(tmp_path)
+    assert run(capsys, "reconstruct", "ball.npy", "-o", "out")[0] == 0
+    written = (tmp_path / "out" / "ball.json").read_bytes()
+    (tmp_path / "b").mkdir()
+    np.savetxt(tmp_path / "ball.xyz", np.load(scan))
+    np.save(tmp_path / "b" / "ball.npy", np.load(scan))
+    for other in ("ball.xyz", "b/ball.npy"):
+        assert f"holds the results of {scan}" in refused(capsys, "reconstruct", other, "-o", "out")
+    assert (tmp_path / "out" / "ball.json").read_bytes() == written
+    monkeypatch.chdir(tmp_path / "b")
+    assert run(capsys, "reconstruct", "../ball.npy", "-o", "../out")[0] == 0
+    os.remove(scan)
+    assert run(capsys, "reconstruct", "ball.npy", "-o", "../out")[0] == 0
+
+
+def test_a_file_of_its_own_in_place_of_the_report_is_none_of_another_scan(capsys, scan, calls, tmp_path):
+    for text in ("[]", "{", '{"scan": 3}'):
+        (tmp_path / "out").mkdir(exist_ok=True)
+        (tmp_path / "out" / "ball.json").write_text(text)
+        assert run(capsys, "reconstruct", scan, "-o", tmp_path / "out")[0] == 0
+
+
+def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan, calls):
+    message = refused(capsys, "reconstruct", scan, "-o", "out", "--resolutoin", "32")
+    assert "--resolutoin 32 (is --resolution meant?)" in message
+    assert "python -m core reconstruct --help" in message
+    message = refused(capsys, "reconstruct", scan, "b.ply", "c.ply", "-o", "out")
+    assert "b.ply c.ply; reconstruct takes one scan at a time" in message
+    assert "python -m core info --help" in refused(capsys, "info", scan, "--zzz")
+
+
 def test_errors_with_json_are_json_too(capsys):
     status, out, err = run(capsys, "info", "none.ply", "--json")
     assert status == 2
@@ -406,13 +454,16 @@ def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     assert os.listdir(tmp_path / "out") == []
 
 
-def test_a_thread_may_run_it(scan, capsys):
+@pytest.mark.parametrize("command", [["info"], ["reconstruct", "-o", "out"]])
+def test_a_thread_may_run_it(scan, calls, capsys, command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     status = []
-    thread = threading.Thread(target=lambda: status.append(cli.main(["info", str(scan)])))
+    thread = threading.Thread(target=lambda: status.append(cli.main([*command, str(scan)])))
     thread.start()
     thread.join()
     assert status == [0]
-    assert "points" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "points" in printed or "samples" in printed
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")

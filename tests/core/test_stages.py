@@ -17,10 +17,13 @@ from core import (
     distance_field,
     double_cover,
     estimate_normals,
+    find_crossings,
+    find_sides,
     fit_grid,
     fit_local_surface,
     local_spacing,
     reconstruct,
+    single_layer,
 )
 from core.io.points import read_points
 from tests import shapes
@@ -84,7 +87,14 @@ def test_stages_alone_refuse_what_a_run_refuses():
                 stage(points, wrong)
     with pytest.raises(InputError, match="3 points given; at least 4"):
         estimate_normals(points[:3], spacing[:3])
-    surface = fit_local_surface(points, points, np.ones(300), spacing, 3.0)
+    for normals, confidence, message in (
+        (points[:5], np.ones(300), r"shapes \(5, 3\) and \(300,\) for 300 points"),
+        (points, np.ones(5), r"shapes \(300, 3\) and \(5,\) for 300 points"),
+        (0 * points, np.ones(300), "300 known normals have no direction"),
+    ):
+        with pytest.raises(InputError, match=message):
+            fit_local_surface(points, normals, confidence, spacing, 3.0)
+    surface = fit_local_surface(points.tolist(), points.tolist(), [1] * 300, spacing, 3.0)
     for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
         with pytest.raises(SettingsError, match="is 'foo'; choose one of"):
             distance_field(surface, grid, **words)
@@ -101,3 +111,32 @@ def test_axes_given_to_the_stage_of_normals_may_have_any_length(solver):
     normals, _, _ = estimate_normals(points, local_spacing(points), settings, ([7], [[0, 3.0, 4.0]]))
     np.testing.assert_allclose(normals[7], [0, 0.6, 0.8])
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1)
+
+
+@pytest.mark.parametrize(
+    ("scale", "centre"),
+    [(1e9, (0, 0, 0)), (1e-9, (0, 0, 0)), (1, (4e5, 5e6, 100)), (1e3, (-1e9, 0, 1e8))],
+    ids=["nanometres", "tiny", "map coordinates", "far off"],
+)
+def test_stages_follow_scale_and_place(scale, centre):
+    """A sphere's normals, distances and meshes, each as close as on the unit sphere at the origin."""
+    true = shapes.sphere(400)
+    points = true * scale + centre
+    spacing = local_spacing(points)
+    normals, confidence, _ = estimate_normals(points, spacing)
+    assert np.abs((normals * true).sum(axis=1)).min() > 0.998
+
+    surface, grid = fit_local_surface(points, normals, confidence, spacing, bridge=3), fit_grid(points, 24)
+    values, near = distance_field(surface, grid)
+    x = (grid.positions(np.arange(values.size)) - centre) / scale
+    off = np.abs(values.ravel() / scale - shapes.sphere_distance(x)) * scale / grid.spacing
+    assert off.mean() < 0.02
+
+    crossings = find_crossings(near, surface, grid)
+    sheet, unoriented = single_layer(
+        values, near, crossings, find_sides(values, crossings, surface, grid), surface, grid
+    )
+    assert not unoriented
+    for mesh in (double_cover(values, near, surface, grid, 0.5), sheet):
+        assert (mesh.edge_counts()[1] == 2).all()
+        assert shapes.sphere_distance((mesh.vertices - centre) / scale).max() < 0.02

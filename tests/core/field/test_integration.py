@@ -161,7 +161,7 @@ class TestAlone:
         values, near = distance_field(surface, grid)
         projected = surface.project(grid.positions(near.node), nearest=FROM_NODES)
         _, feet = settled_feet(surface, grid, near.node, projected, Progress())
-        found, bound = values.flat[near.node], feet.distances(grid.positions(near.node))
+        found, bound = values.flat[near.node], feet.distances(grid.positions(near.node) - grid.origin)
         away = found > 0.7 * grid.spacing
         assert ((found - bound)[away] < 0.2 * grid.spacing).all()
         assert ((projected.distance - bound)[away] > 0.3 * grid.spacing).sum() > 20

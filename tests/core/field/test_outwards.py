@@ -38,7 +38,7 @@ def groups(ball):
 
 
 def feet_of(points, radius=0.0):
-    return Feet(*np.float32([points.T, points.T]), np.full(len(points), radius, np.float32))
+    return Feet(*np.float32([(points - GRID.origin).T, points.T]), np.full(len(points), radius, np.float32))
 
 
 def nothing_known(groups):
@@ -76,7 +76,7 @@ def test_distances_are_those_to_the_nearest_foot_of_all(no_sample, groups, count
     values = nothing_known(groups)
     carried_outwards(values, groups, feet, no_sample, WIDTH, Progress())
     x = GRID.positions(np.arange(np.prod(GRID.shape)))
-    expected = np.minimum(KDTree(feet.centres.T).query(x)[0], WIDTH * CELL)
+    expected = np.minimum(KDTree(feet.centres.T).query(x - GRID.origin)[0], WIDTH * CELL)
     off = np.abs(values.dense().reshape(-1) - expected) / CELL
     assert np.mean(off > 1e-4) < 0.01
     assert off.max() < 0.3

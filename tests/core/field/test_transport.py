@@ -1,5 +1,7 @@
 """The distance carried outwards: which foot each node takes, against all of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -16,12 +18,12 @@ from tests import shapes
 
 
 def seeded(points, normals, resolution):
-    """A grid, its nodes that have feet on the surface of samples with these normals, and the feet."""
+    """A grid from the origin, its nodes that have feet on the surface of samples with these normals, and the feet."""
     surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 3.0)
     grid = fit_grid(points, resolution)
     node = near_band(surface, grid).node
     projected = surface.project(grid.positions(node), nearest=FROM_NODES)
-    return grid, *settled_feet(surface, grid, node, projected, Progress())
+    return replace(grid, origin=np.zeros(3)), *settled_feet(surface, grid, node, projected, Progress())
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,7 @@ def sheets():
 def scattered():
     """Nodes here and there, each with a foot of its own within half a cell: none beside another to climb to."""
     random = np.random.default_rng(0)
-    grid = Grid(np.array([-0.3, 0.1, 0.7]), 0.25, (41, 36, 33))
+    grid = Grid(np.zeros(3), 0.25, (41, 36, 33))
     node = np.sort(random.choice(np.prod(grid.shape), 300, replace=False))
     places = (grid.positions(node) + 0.125 * random.uniform(-1, 1, (300, 3))).T.astype(np.float32)
     return grid, node, Feet(places, np.tile(np.float32([[0], [0], [1]]), 300), np.zeros(300, np.float32))
