@@ -5,6 +5,8 @@ threads BLAS and LAPACK round differently, OpenBLAS even in systems of three equ
 summed and solved here.
 """
 
+from collections.abc import Callable, Iterable, Sequence
+
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
@@ -122,15 +124,44 @@ def lengths(a: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("im,im->m", a, a))
 
 
-def outer_sum(terms: np.ndarray) -> np.ndarray:
-    """Sums of one term for each of three axes, (3,w,m) -> (w,w,w,m)."""
+def outer_sum(terms: Sequence[np.ndarray]) -> np.ndarray:
+    """Sums of one term for each of three axes, three (w,...) -> (w,w,w,...)."""
     return terms[0][:, None, None] + terms[1][:, None] + terms[2]
+
+
+def laplacian_symbol(shape: tuple[int, int, int]) -> np.ndarray:
+    """The eigenvalues, of the shape (nx,ny,nz), of the negative Laplacian of a grid's graph without flow through the
+    box, whose eigenvectors are those of the cosine transform."""
+    return outer_sum([2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in shape])
 
 
 def symmetric(weight: np.ndarray, low: np.ndarray, high: np.ndarray, n: int) -> csr_matrix:
     """Sparse (n,n) that links pairs, (e,) rows of either end, both ways; weights (e,) of one pair are summed."""
     ends = np.append(low, high), np.append(high, low)
     return coo_matrix((np.append(weight, weight), ends), shape=(n, n)).tocsr()
+
+
+def conjugate_gradients(
+    apply: Callable, right: np.ndarray, start: np.ndarray, precondition: Callable, tolerance: float, steps: Iterable
+) -> np.ndarray:
+    """The u that a symmetric, positive (semi)definite `apply` takes to `right`, arrays of one shape, from `start` on
+    until the residual is at most `tolerance` times as large as `right`, or the `steps` end (G. H. Golub and C. F. Van
+    Loan, Matrix Computations, section 11.5). SciPy's sums by BLAS."""
+    u, residual = start.copy(), right - apply(start)
+    goal = tolerance * np.sqrt(inner(right, right))
+    search = z = precondition(residual)
+    energy = inner(residual, z)
+    for _ in steps:
+        if np.sqrt(inner(residual, residual)) <= goal:
+            break
+        image = apply(search)
+        step = energy / inner(search, image)
+        u += step * search
+        residual = residual - step * image
+        z = precondition(residual)
+        before, energy = energy, inner(residual, z)
+        search = z + energy / before * search
+    return u
 
 
 def inner(a: np.ndarray, b: np.ndarray) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 
 from ..errors import SettingsError
-from ..linalg import outer, principal_axes, row_dots
+from ..linalg import laplacian_symbol, outer, principal_axes, row_dots
 from ..progress import Progress
 from .diffusion import DIFFUSION_LENGTH
 from .grid import CORNERS, Grid
@@ -91,8 +91,7 @@ def _corners(points, grid):
 
 def _screened_poisson(source, length):
     """Solution of (1 - length^2 Laplacian) Y = source, (nx,ny,nz), `length` in cells."""
-    modes = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in source.shape]
-    symbol = 1 + length**2 * (modes[0][:, None, None] + modes[1][:, None] + modes[2])
+    symbol = 1 + length**2 * laplacian_symbol(source.shape)
     spectrum = dctn(source, workers=-1, overwrite_x=True)
     spectrum /= symbol
     return idctn(spectrum, workers=-1, overwrite_x=True)

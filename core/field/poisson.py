@@ -4,7 +4,7 @@ import numpy as np
 from scipy.fft import dctn, idctn
 from scipy.ndimage import map_coordinates
 
-from ..linalg import inner
+from ..linalg import conjugate_gradients, laplacian_symbol
 from ..progress import Progress
 from .grid import Grid
 from .grid_diffusion import check_held, grid_axes
@@ -79,30 +79,11 @@ def _laplacian(u):
 
 def _solve(anchor, right, start, progress):
     """Conjugate gradients on (Laplacian + anchor) u = right."""
-    modes = [2 - 2 * np.cos(np.pi * np.arange(n) / n) for n in right.shape]
-    symbol = modes[0][:, None, None] + modes[1][:, None] + modes[2] + anchor.mean()
-
-    free = anchor == 0
+    symbol, free = laplacian_symbol(right.shape) + anchor.mean(), anchor == 0
 
     def precondition(residual):
         smooth = idctn(dctn(free * residual, norm="ortho", workers=-1) / symbol, norm="ortho", workers=-1)
         return np.where(free, smooth, residual / (6 + anchor))
 
-    u = start.copy()
-    residual = right - _laplacian(u) - anchor * u
-    goal = _TOLERANCE * np.sqrt(inner(right, right))
-    z = precondition(residual)
-    search, energy = z, inner(residual, z)
-    for iteration in range(_MAX_ITERATIONS):
-        progress(iteration / _MAX_ITERATIONS)
-        if np.sqrt(inner(residual, residual)) <= goal:
-            break
-        image = _laplacian(search) + anchor * search
-        step = energy / inner(search, image)
-        u += step * search
-        fresh = residual - step * image
-        z = precondition(fresh)
-        before, energy = energy, inner(fresh, z)
-        search = z + energy / before * search
-        residual = fresh
-    return u
+    steps = progress.each(range(_MAX_ITERATIONS))
+    return conjugate_gradients(lambda u: _laplacian(u) + anchor * u, right, start, precondition, _TOLERANCE, steps)

@@ -6,7 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.linalg import eigenvalues, inner, outer, principal_axes, shortened, solve_positive, tangent_frames
+from core.linalg import (
+    conjugate_gradients,
+    eigenvalues,
+    inner,
+    laplacian_symbol,
+    outer,
+    principal_axes,
+    shortened,
+    solve_positive,
+    tangent_frames,
+)
 from tests.shapes import random_rotation
 
 
@@ -115,3 +125,41 @@ def test_long_vectors_are_shortened_and_short_ones_stay():
     steps = np.array([[3.0, 4.0, 0.0], [0.3, 0.4, 0.0], [0.0, 0.0, 0.0]])
     np.testing.assert_allclose(shortened(steps, 1.0), [[0.6, 0.8, 0.0], steps[1], steps[2]], atol=1e-15)
     np.testing.assert_array_equal(shortened(steps, np.array([5.0, 0.5, 0.0])), steps)
+
+
+def solved(matrix, right, tolerance, steps, start=None):
+    start = np.zeros_like(right) if start is None else start
+    diagonal = np.diag(matrix).reshape(right.shape)
+    apply = lambda u: (matrix @ u.ravel()).reshape(u.shape)  # noqa: E731
+    return conjugate_gradients(apply, right, start, lambda residual: residual / diagonal, tolerance, steps)
+
+
+def test_conjugate_gradients_solve_until_the_residual_is_small(random):
+    half, right = random.normal(size=(60, 60)), random.normal(size=(3, 4, 5))
+    matrix, seen = half @ half.T + 5 * np.eye(60), []
+    found = solved(matrix, right, 1e-10, (seen.append(k) for k in range(500)))
+    np.testing.assert_allclose(matrix @ found.ravel(), right.ravel(), atol=1e-8)
+    assert 10 < len(seen) < 120
+    rough = solved(matrix, right, 0.1, range(500))
+    residual = np.linalg.norm(matrix @ rough.ravel() - right.ravel()) / np.linalg.norm(right)
+    assert 1e-4 < residual <= 0.1
+
+
+def test_conjugate_gradients_end_with_their_steps_and_where_there_is_nothing_to_do(random):
+    half, right = random.normal(size=(30, 30)), random.normal(size=30)
+    matrix = half @ half.T + np.eye(30)
+    start = np.linalg.solve(matrix, right)
+    np.testing.assert_array_equal(solved(matrix, right, 0.0, range(0), start), start)
+    np.testing.assert_array_equal(solved(matrix, right, 1e-6, range(50), start), start)
+    np.testing.assert_array_equal(solved(matrix, 0 * right, 1e-6, range(50)), 0)
+
+
+def test_the_symbol_is_that_of_the_graph_of_a_grid():
+    shape = (3, 4, 2)
+    index, laplacian = np.arange(24).reshape(shape), np.zeros((24, 24))
+    for axis in range(3):
+        low, high = (np.delete(index, end, axis).ravel() for end in (-1, 0))
+        np.add.at(laplacian, (low, low), 1)
+        np.add.at(laplacian, (high, high), 1)
+        np.add.at(laplacian, (np.append(low, high), np.append(high, low)), -1)
+    np.testing.assert_allclose(np.sort(laplacian_symbol(shape).ravel()), np.linalg.eigvalsh(laplacian), atol=1e-12)

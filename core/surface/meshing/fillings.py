@@ -7,15 +7,25 @@ _BOUND, _THERE = 1e2, 1e6  # square cells, what an edge and a face count that th
 _CHUNK = 1 << 20  # triples of corners that are weighed at a time
 
 
-def fillings(vertices, loops, taken_edges, taken_faces, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles (t,3) between the vertices of each loop, a list of indices (l,) into `vertices` (v,3), and the number
+def fillings(vertices, loops, edges, faces, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (t,3) between the vertices of each loop, an array of indices (l,) into `vertices` (v,3), and the number
     of their loop (t,).
 
     Those with the least sum of areas and a tenth of their squared sides, found by dynamic programming (Barequet and
-    Sharir, CAGD 12(2), 1995). Edges taken, by their :func:`edge_keys`, are passed by where that can be helped; a loop
-    that cannot be spanned without a face that is taken, by :func:`face_keys`, gets no triangles.
+    Sharir, CAGD 12(2), 1995). The `edges` (e,2) that there are, are passed by where that can be helped; a loop that
+    cannot be spanned without one of the `faces` (f,3) that there are gets no triangles.
     """
+    at_loop = np.zeros(len(vertices), bool)
+    at_loop[np.concatenate(loops)] = True
+    vertex, number = np.flatnonzero(at_loop), np.cumsum(at_loop) - 1
+    edges, faces = (number[some[at_loop[some].all(axis=1)]] for some in (edges, faces))
+    triangle, loop = _fillings(vertices[vertex], [number[loop] for loop in loops], edges, faces, cell)
+    return vertex[triangle], loop
+
+
+def _fillings(vertices, loops, edges, faces, cell):
     n = len(vertices)
+    taken_edges, taken_faces = edge_keys(edges, n), _face_keys(faces, n)
     triangles, owners = [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)]
     length = np.array([len(loop) for loop in loops])
     for number in _of_one_length(length):
@@ -27,7 +37,7 @@ def fillings(vertices, loops, taken_edges, taken_faces, cell: float) -> tuple[np
         p, q, r = (vertices[corners[..., k]] / cell for k in range(3))
         area = 0.5 * np.linalg.norm(np.cross(q - p, r - p), axis=2)
         squares = sum(((a - b) ** 2).sum(axis=2) for a, b in ((p, q), (q, r), (r, p)))
-        there = np.isin(face_keys(corners.reshape(-1, 3), n), taken_faces).reshape(area.shape)
+        there = np.isin(_face_keys(corners.reshape(-1, 3), n), taken_faces).reshape(area.shape)
         weight = np.full((len(number), size, size, size), np.inf)
         weight[:, at[0], at[1], at[2]] = area + _FAIR * squares + _THERE * there
         chord = np.stack(np.triu_indices(size, 2), axis=1)
@@ -48,8 +58,8 @@ def edge_keys(edges, n: int) -> np.ndarray:
     return np.minimum(a, b) * n + np.maximum(a, b)
 
 
-def face_keys(faces, n: int) -> np.ndarray:
-    """One number for each triangle between n vertices, whichever way it is wound, (f,3) -> (f,) int64."""
+def _face_keys(faces, n):
+    """One number for each triangle between n vertices, at most 2^21, whichever way it is wound, (f,3) -> (f,) int64."""
     a, b, c = np.sort(faces, axis=1).astype(np.int64).T
     return (a * n + b) * n + c
 

@@ -17,15 +17,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import LinearOperator, cg
 from scipy.spatial import KDTree
 
 from ...field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
 from ...field.grid import Grid, node_strides
 from ...field.local_surface import LocalSurface
-from ...linalg import symmetric
+from ...linalg import conjugate_gradients, symmetric
 from ...lookup import is_among, numbered
 from ...progress import Progress
 from ..edges.crossings import Crossings
@@ -243,10 +242,11 @@ def _sides(edges: Iterable, n, outside, progress):
         links += symmetric(weight[free], a[free], b[free], n)
         push += np.bincount((a + b - outside)[~free], weight[~free], n)
     progress(0.3)
-    laplacian = LinearOperator((n, n), lambda x: degree * x - links @ x, dtype=float)
-    scales = diags(1 / np.maximum(degree, 1.0))
-    looks = progress.part(0.4, 0.7).each(range(_STEPS))
-    side, _ = cg(laplacian, push, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=lambda _: next(looks))
+    steps = progress.part(0.4, 0.7).each(range(_STEPS))
+    scale = np.maximum(degree, 1.0)
+    side = conjugate_gradients(
+        lambda x: degree * x - links @ x, push, np.zeros(n), lambda residual: residual / scale, _TOLERANCE, steps
+    )
     side[outside] = 1
     return side
 

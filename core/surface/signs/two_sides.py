@@ -16,16 +16,15 @@ form a patch as long as the sheet is wide, or one that parts the surface around 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import cg
 from scipy.spatial import KDTree
 
 from ...field.blocks import Blocks, each, put
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
-from ...linalg import row_dots, symmetric
+from ...linalg import conjugate_gradients, row_dots, symmetric
 from ...lookup import is_among, numbered
 from ...parallel import over_rows
 from ...progress import Progress
@@ -207,11 +206,13 @@ def _orientations(links, progress):
     facing, part = spread_strongest(links)
     size = np.bincount(part)
     shift = _SHIFT * np.median(degree[degree > 0]) if links.nnz else 1.0
-    matrix, scales = diags(degree + shift) - links, diags(1 / (degree + shift))
+    scale = degree + shift
     for number in range(_ITERATIONS):
-        looks = progress.part(number / _ITERATIONS, (number + 1) / _ITERATIONS).each(range(_STEPS))
-        before, look = facing > 0, lambda _, looks=looks: next(looks)
-        facing, _ = cg(matrix, shift * facing, x0=facing, rtol=_TOLERANCE, maxiter=_STEPS, M=scales, callback=look)
+        steps = progress.part(number / _ITERATIONS, (number + 1) / _ITERATIONS).each(range(_STEPS))
+        before = facing > 0
+        facing = conjugate_gradients(
+            lambda x: scale * x - links @ x, shift * facing, facing, lambda x: x / scale, _TOLERANCE, steps
+        )
         length = np.sqrt(np.bincount(part, facing**2) / size)
         facing = np.clip(facing / np.maximum(length, np.finfo(float).tiny)[part], -1, 1)
         if ((facing > 0) == before).all():

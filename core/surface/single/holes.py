@@ -15,7 +15,7 @@ from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, row_dots
 from ...lookup import numbered, rows_of
 from ..mesh import Mesh, at_corners
-from ..meshing.fillings import edge_keys, face_keys, fillings
+from ..meshing.fillings import edge_keys, fillings
 
 _LONGEST = 64  # edges of a loop that may be closed
 _DETOUR, _CORNER = 1.5, 1.0  # of the way along the other sheet, relative to the straight one, and cells more
@@ -68,10 +68,7 @@ def _filled(mesh, borders, loops, paths, surface, cell):
     loops = [loop for loop in [*loops, *_closed(short, mesh, edges[counts > 1], cell)] if len(loop) <= _LONGEST]
     if not loops:
         return mesh
-    n, at_loop = len(mesh.vertices), np.zeros(len(mesh.vertices), bool)
-    at_loop[np.concatenate(loops)] = True
-    taken = (edge_keys(edges[at_loop[edges].all(axis=1)], n), face_keys(mesh.faces[at_loop[mesh.faces].all(axis=1)], n))
-    triangle, loop = fillings(mesh.vertices, loops, *taken, cell)
+    triangle, loop = fillings(mesh.vertices, loops, edges, mesh.faces, cell)
     longest, off = _reach(mesh.vertices, triangle, loop, loops, surface)
     middle = np.array([mesh.vertices[corners].mean(axis=0) for corners in loops])
     around = surface.around(middle)

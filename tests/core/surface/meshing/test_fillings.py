@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from core.surface.meshing.fillings import edge_keys, face_keys, fillings
+from core.surface.meshing.fillings import fillings
 
-NONE = np.empty(0, np.int64)
+NO_EDGES, NO_FACES = (np.empty((0, k), np.int64) for k in (2, 3))
 
 
-def spanned(vertices, loop, edges=NONE, faces=NONE):
+def spanned(vertices, loop, edges=NO_EDGES, faces=NO_FACES):
     return fillings(vertices, [np.asarray(loop)], edges, faces, 1.0)[0]
 
 
@@ -54,7 +54,7 @@ def test_a_notched_polygon_is_filled_and_no_more():
 def test_loops_of_several_sizes_keep_their_numbers():
     x = np.random.default_rng(1).normal(size=(12, 3))
     loops = [np.array([0, 1, 2, 3, 4]), np.array([5, 6, 7]), np.array([8, 9, 10, 11, 0])]
-    triangle, loop = fillings(x, loops, NONE, NONE, 1.0)
+    triangle, loop = fillings(x, loops, NO_EDGES, NO_FACES, 1.0)
     for number, corners in enumerate(loops):
         assert (loop == number).sum() == len(corners) - 2
         assert set(triangle[loop == number].reshape(-1)) == set(corners)
@@ -65,7 +65,14 @@ def test_edges_and_faces_that_are_taken_are_passed_by():
     short = set(map(frozenset, spanned(x, range(4)).tolist()))
     assert short == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
     long = {frozenset({0, 1, 2}), frozenset({0, 2, 3})}
-    assert set(map(frozenset, spanned(x, range(4), edges=edge_keys(np.array([[3, 1]]), 4)).tolist())) == long
-    assert set(map(frozenset, spanned(x, range(4), faces=face_keys(np.array([[3, 1, 0]]), 4)).tolist())) == long
-    every = face_keys(np.array([[0, 1, 2], [0, 1, 3]]), 4)
-    assert len(spanned(x, range(4), faces=every)) == 0
+    assert set(map(frozenset, spanned(x, range(4), edges=np.array([[3, 1]])).tolist())) == long
+    assert set(map(frozenset, spanned(x, range(4), faces=np.array([[3, 1, 0]])).tolist())) == long
+    assert len(spanned(x, range(4), faces=np.array([[0, 1, 2], [0, 1, 3]]))) == 0
+
+
+def test_faces_are_told_apart_in_meshes_of_millions_of_vertices():
+    """In one number of 64 bits for three vertices each, these two would be the same."""
+    x = np.zeros((1 << 22, 3))
+    loop = [1 << 20, 2_000_000, 3_000_000]
+    x[loop] = np.eye(3)
+    assert len(spanned(x, loop, faces=np.array([[0, 2_000_000, 3_000_000]]))) == 1

@@ -177,8 +177,8 @@ def test_fillings_on_faces_that_are_there_are_told():
         ring = 31 * (10 + x) + 10 + y
         place = mesh.vertices.copy()
         place[ring, 2] += height * CELL
-        none = np.empty(0, np.int64)
-        triangle, loop = fillings(place, [ring], none, none, CELL)
+        none = np.empty((0, 3), np.int64)
+        triangle, loop = fillings(place, [ring], none[:, :2], none, CELL)
         above = Mesh(np.concatenate([mesh.vertices, place]), mesh.faces)
         return _covered(above, triangle + len(place), loop, 1, CELL)[0]
 
