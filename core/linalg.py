@@ -113,6 +113,11 @@ def row_dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("...k,...k->...", a, b)
 
 
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (...,k) made unit along the last axis; those without a length stay zero."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(float).tiny)
+
+
 def shortened(steps: np.ndarray, longest: float | np.ndarray) -> np.ndarray:
     """Vectors (m,3), those that are longer than `longest`, (m,) or one for all, made as long as that."""
     length = np.maximum(np.linalg.norm(steps, axis=1), np.finfo(float).tiny)

@@ -7,14 +7,13 @@ along lines, so within q there are few of those within 4 q; of copies there are 
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from .parts import connected_parts
 from .progress import Progress
 
 _CLOSE = 0.01, 0.05, 0.1  # local spacings, within which most copies may lie
-_WIDER, _MOST = 4.0, 0.7  # there are some if, of points with another so much wider around, this share has it that close
+_WIDER, _MOST = 4.0, 0.7  # of the points with another within 4 times as far, the least share that has one within it
 _LEAST, _FEWEST = 0.01, 8  # and if this share of all points has, and so many; of random ones .008 within a twentieth
 _MERGED = 2.0  # times as far, the other copies may lie
 _NEIGHBOURS = 16
@@ -60,9 +59,8 @@ def _first_of_clusters(tree, reach, progress):
         distance, other, spacing = _neighbours(tree, rows)
         row, column = np.nonzero(distance < reach * spacing[:, None])
         ends.append((rows[row], other[row, column]))
-    ends = tuple(np.concatenate(each) for each in zip(*ends, strict=True))
-    links = coo_matrix((np.ones(len(ends[0]), bool), ends), shape=(tree.n, tree.n))
-    return np.sort(np.unique(connected_components(links, directed=False)[1], return_index=True)[1])
+    part = connected_parts(*(np.concatenate(each) for each in zip(*ends, strict=True)), tree.n)
+    return np.sort(np.unique(part, return_index=True)[1])
 
 
 def _neighbours(tree, rows):

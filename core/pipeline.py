@@ -1,6 +1,7 @@
 """The whole method, in the order of the paper's algorithm box."""
 
 import time
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -17,15 +18,12 @@ from .field.narrow_band import banded_field, trimmed
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
-from .parallel import in_order
 from .points import local_spacing, prepare_samples, rounding_warning
-from .progress import Progress, watched
+from .progress import watched
 from .reconstruction import Reconstruction
 from .settings import WHOLE_BOX, Settings
-from .surface.extract import Surfaces, band_for, extract_surfaces
-from .surface.mesh import curve_count
-from .surface.meshing.pieces import piece_count
-from .surface.meshing.quality import quad_quality, triangle_quality
+from .surface.extract import band_for, extract_surfaces
+from .surface.facts import mesh_facts
 
 _COARSE = 0.1  # cells, median local spacing below which a warning says that the grid is too coarse for the points
 
@@ -64,12 +62,12 @@ def reconstruct(
 def _reconstruct(points, settings, constraints, normals, progress):
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings are {settings!r}; give Settings(...), or nothing for the defaults")
-    stages = _Stages()
-    with stages("points"):
+    seconds = {}
+    with _timed(seconds, "points"):
         samples = prepare_samples(points, progress.part(0.0, 0.01, "points")).in_spatial_order()
         given = len(np.asarray(points))
 
-    with stages("cleaning"):
+    with _timed(seconds, "cleaning"):
         cleaning, unmoved = {}, samples.given
         if normals is None:
             samples, cleaning = clean(samples, settings, progress.part(0.01, 0.09, "cleaning"))
@@ -82,7 +80,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         estimate = estimate_cost(spacing, grid, settings, noisy="noisy" in cleaning)
         large = check_budget(estimate, spacing, grid, settings)
 
-    with stages("normals"):
+    with _timed(seconds, "normals"):
         if normals is None:
             part = progress.part(0.1, 0.2, "normals")
             normals, confidence, solved = estimate_normals(samples.points, spacing, settings, constraints, part)
@@ -90,7 +88,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
             normals, confidence = known_normals(normals, given, samples.source_index)
             solved = {}
 
-    with stages("field"):
+    with _timed(seconds, "field"):
         part = progress.part(0.2, 0.25, "distance field")
         local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)
         part = progress.part(0.25, 0.8, "distance field")
@@ -100,7 +98,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         else:
             values, near, feet = banded_field(local, grid, band_for(settings, local, grid), part)
 
-    with stages("surface"):
+    with _timed(seconds, "surface"):
         part = progress.part(0.8, 0.99)
         surfaces = extract_surfaces(values, near, local, grid, settings, samples.to_input_units, part)
 
@@ -118,7 +116,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         "meshes": mesh_facts(surfaces, progress.part(0.99, 1.0, "report")),
         "grid": {"shape": list(grid.shape), "cell": grid.spacing * samples.scale},
         "spacing": typical,
-        "seconds": stages.seconds,
+        "seconds": seconds,
         "estimate": asdict(estimate),
         "peak_memory_mb": peak_memory_mb(),
         "warnings": [*samples.warnings, *rounded, *ignored, *large, *_too_coarse(local, grid), *surfaces.warnings],
@@ -148,31 +146,6 @@ def _too_coarse(local, grid):
     )
 
 
-def _edge_facts(mesh):
-    edges, count = mesh.edge_counts()
-    return {"borders": curve_count(edges[count == 1]), "nonmanifold_edges": int((count > 2).sum())}
-
-
-_FACTS = (  # what takes longest first, as they are found side by side
-    triangle_quality,
-    _edge_facts,
-    lambda mesh: {"pieces": piece_count(mesh)},
-    quad_quality,
-)
-
-
-def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
-    """What the report tells of each mesh, by kind."""
-    facts, progress, kinds = {}, Progress.of(progress), len(surfaces.meshes)
-    for number, (kind, mesh) in enumerate(surfaces.meshes.items()):
-        facts[kind] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
-        facts[kind] |= {"pieces_dropped": surfaces.dropped[kind]}
-        asked = progress.part(number / kinds, (number + 1) / kinds).each(_FACTS)
-        for _, found in in_order(lambda fact, mesh=mesh: fact(mesh), asked):
-            facts[kind] |= found
-    return facts
-
-
 def _field(surfaces, near, feet, grid, samples, band):
     """The field in the input's units."""
     near = replace(near, step=near.step * samples.scale)
@@ -184,18 +157,9 @@ def _field(surfaces, near, feet, grid, samples, band):
     return BandedField(blocks, origin, cell, band * cell, sdf, feet.in_cells(grid), near)
 
 
-class _Stages:
-    """Seconds spent in each stage, by name."""
-
-    def __init__(self):
-        self.seconds = {}
-
-    def __call__(self, name):
-        self._name, self._start = name, time.perf_counter()
-        return self
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.seconds[self._name] = time.perf_counter() - self._start
+@contextmanager
+def _timed(seconds, stage):
+    """Puts the seconds that the stage takes into `seconds`, by its name."""
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start

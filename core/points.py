@@ -25,11 +25,11 @@ class Samples:
     """Distinct, finite samples and the similarity that takes them to the unit frame.
 
     points       : (n,3) float64, unit frame: bounding box centred at 0, longest side 1
-    given        : (n,3) float64, the same in input units, untouched
+    given        : (n,3) float64, the same in input units, exactly as given where they were not moved
     source_index : (n,) int64, row of each sample in the input
     centre       : (3,) float64, input units
     scale        : float, longest side of the bounding box in input units
-    warnings     : what was dropped, one line each
+    warnings     : what was dropped or moved, one line each
     """
 
     points: np.ndarray

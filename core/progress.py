@@ -81,9 +81,9 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
 
     A callback hears of the progress in the caller's thread while the work is done in another: at every report, and
     the last one again where the work is silent for long. So a cancel is heeded at once, even while a library sorts
-    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. Where a
-    stage is done once another one is seen to have failed, the fraction waits. With a `Progress` or nothing to report
-    to, all is done in the caller's thread.
+    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. Fractions
+    never fall: where a stage is done late, whose slice of the bar lies further back, the callback hears the highest one
+    so far until that is passed. With a `Progress` or nothing to report to, all is done in the caller's thread.
     """
     if progress is None or isinstance(progress, Progress):
         return work(Progress.of(progress))

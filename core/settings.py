@@ -116,7 +116,7 @@ class Settings:
         "Drop stray points far from any surface, and the few that lie further from all others than these from each "
         "other, before anything else; how many is in the report",
     )
-    denoise: float = _option(
+    denoise: float | str = _option(
         "auto",
         "How far points are moved onto the smooth surface through their neighbours: not at all (0) to all the way (1). "
         "With auto all the way where the scan, or a good part of it, is found noisy, or is a frame of a depth camera "
@@ -124,7 +124,7 @@ class Settings:
         limits=(0.0, 1.0),
         word="auto",
     )
-    memory_limit: float = _option(
+    memory_limit: float | str = _option(
         "auto",
         "A run that would need more memory than this is refused once its points are cleaned. With auto the limit is "
         "70 % of the memory that is free",

@@ -21,6 +21,7 @@ from ..core.progress import Progress
 from ..core.settings import Settings
 from ..core.surface.attributes import nearest_samples, residuals
 from ..core.surface.extract import extract_surfaces
+from ..core.surface.facts import mesh_facts
 from . import stored_field
 
 CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
@@ -259,7 +260,7 @@ def _extracted(task, progress):
         cell=grid.spacing * samples.scale,
         shape=grid.shape,
         report=report_json(
-            {"settings": asdict(settings), "meshes": pipeline.mesh_facts(found), "seconds": {"surface": seconds}}
+            {"settings": asdict(settings), "meshes": mesh_facts(found), "seconds": {"surface": seconds}}
         ),
         warnings=(*samples.warnings, *found.warnings),
         seconds=seconds,

@@ -11,7 +11,7 @@ from .depth_steps import between_steps
 from .outliers import find_outliers
 from .positions import denoise
 
-_FAR = 2.0  # times as long as the box around the rest is one around strays, too, of which it is said, at least
+_FAR = 2.0  # times as long as the box around those kept is the one around all, at least, for cells to be told larger
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:

@@ -1,17 +1,19 @@
 """Small parts of a cloud, far from the others, that are no surface of their own."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, KDTree
 
+from ..parts import connected_parts
 from ..progress import Progress
 from .surroundings import NEIGHBOURS, SHEET, Surroundings, thickness
 
 _GAP = 4.0  # times the local spacing on either side, that separates parts
 _OF_ALL, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part: larger ones are no strays
 _LOOKS = 256  # samples of a part whose wider neighbourhoods are looked at
-_FURTHER, _BESIDE = 64, 3.5  # neighbours of a part's samples; others so many spacings of either away are beside it
+_FURTHER, _BESIDE = (
+    64,
+    3.5,
+)  # samples nearest to each of a part, itself among them; others so many spacings of either away are beside it
 _ENOUGH = 16  # samples, of which fewer do not tell a shell from a cloud
 _HULL = 0.95, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
 _CHUNK = 8192  # samples
@@ -47,8 +49,7 @@ def _parts(around):
     one, other = np.repeat(np.arange(n), NEIGHBOURS), around.neighbours[:, 1:].reshape(-1)
     gap = np.linalg.norm(around.points[one] - around.points[other], axis=1)
     joined = gap < _GAP * np.minimum(around.spacing[one], around.spacing[other])
-    links = coo_matrix((joined[joined], (one[joined], other[joined])), shape=(n, n))
-    return connected_components(links, directed=False)[1]
+    return connected_parts(one[joined], other[joined], n)
 
 
 def _beside_others(around, part, marked, progress):

@@ -19,8 +19,8 @@ _TURNED = 1.5  # times the squared level, in local spacings, that slight noise t
 _CORE_LEVEL = 0.1  # local spacings: the core of a noisy part is above this
 _CORE_AGREED = 0.87  # and its normals agree less than this; creases and thin sheets kept above .88
 _PATCHES, _PATCH = 16, 300  # patches of a large cloud in which normals are asked, samples in each
-_SWEEPS = 20  # more change the median confidence by less than .0005 where it is above .9
 _MIDDLE = 100  # of these, those whose neighbours are all there
+_SWEEPS = 20  # more change the median confidence by less than .0005 where it is above .9
 
 
 def looks_noisy(points, spacing) -> bool:

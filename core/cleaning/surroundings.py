@@ -12,7 +12,7 @@ NEIGHBOURS = 8
 SHEET = 0.25  # thickness of a wider neighbourhood, below which a sheet may be seen in it, a noisy one, too
 _SPARSE = 2.5  # spacing over the median of the cloud
 _THICK = 0.2  # thickness of a neighbourhood over its size: a surface has .1, a cloud .3
-_CURVE = 0.1  # second extent over the first: below it neighbours lie along a wire and have no plane
+_CURVE = 0.1  # second extent over the size: below it neighbours lie along a wire and have no plane
 _WIREFRAME = 0.2  # share of samples along wires from which on all of them count as such
 _CHUNK = 8192  # samples
 

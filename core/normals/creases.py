@@ -14,7 +14,7 @@ The paper has no such step. Where there is no crease it changes nothing at all.
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import row_dots
+from ..linalg import row_dots, unit
 from ..progress import Progress
 from .mirrors import Mirrors
 from .planes import neighbourhoods, onto_planes
@@ -116,8 +116,7 @@ def _densest(row, points, spacing, tree, normals, agreed):
     share = np.einsum("rtk,rk->rt", alike, weight) / weight.sum(axis=1)[:, None]
     every, best = np.arange(len(row)), share.argmax(axis=1)
     alike, sign = alike[every, best], np.sign(cosine[every, best])
-    axes = np.einsum("rk,rki->ri", alike * weight * sign, images)
-    axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
+    axes = unit(np.einsum("rk,rki->ri", alike * weight * sign, images))
 
     near *= alike
     rise = row_dots(near, np.abs(row_dots(axes[:, None], direction)))

@@ -8,7 +8,7 @@ and at their corners those of each sheet are few. Chance, and curved sheets, har
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import dots, row_dots
+from ..linalg import dots, row_dots, unit
 from .mirrors import Mirrors
 from .planes import neighbourhoods
 
@@ -61,8 +61,7 @@ def _most_shared(row, points, spacing, tree, normals):
     alike = (np.abs(theirs @ theirs.transpose(0, 2, 1)) > _ALIKE) & inside[:, None] & inside[:, :, None]
     every, best = np.arange(len(row)), alike.sum(axis=2).argmax(axis=1)
     shared, first = alike[every, best], theirs[every, best]
-    axes = np.einsum("rk,rki->ri", shared * np.sign(row_dots(theirs, first[:, None])), theirs)
-    axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), np.finfo(float).tiny)
+    axes = unit(np.einsum("rk,rki->ri", shared * np.sign(row_dots(theirs, first[:, None])), theirs))
 
     present = (np.abs(row_dots(theirs, own[:, None])) > _ALIKE) & inside
     more = shared.sum(axis=1) >= present.sum(axis=1) + _MORE

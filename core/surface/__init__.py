@@ -1,6 +1,7 @@
-"""Stage three, from distances to meshes; :mod:`.extract` says which one is made how.
+"""Stage three, from distances to meshes; :mod:`.extract` makes those asked for, and :mod:`.choice` says how.
 
-mesh, attributes, signed : meshes, what their vertices know, and the signed distance of closed shapes
+mesh, attributes, facts  : meshes, what their vertices know, and what the report tells of them
+signed                   : the signed distance of closed shapes
 
 edges   : which edges of the grid the surface crosses, and where sheets meet
 signs   : which side of it nodes lie on, and where such signed distances are zero

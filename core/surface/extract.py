@@ -1,7 +1,6 @@
 """Stage three: the meshes that were asked for."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -11,27 +10,18 @@ from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
 from ..settings import Settings
-from .double.both_sides import both_sides
-from .double.double_cover import CLAMP, DENSE, SPARSE, double_cover, level_for
-from .double.ridges import ridge_share
-from .edges.meetings import Meetings
+from .choice import SPARSEST, Choice
+from .double.double_cover import CLAMP, SPARSE, level_for
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
-from .meshing.misfit import OFF, chamfer, misfit
-from .meshing.pieces import pieces_touch, pieces_with_samples, without_small_pieces
+from .meshing.misfit import OFF
+from .meshing.pieces import without_small_pieces
 from .signed import signed_distance
-from .signs.sides import may_be_closed, needed_band
-from .single.layer import SingleLayer
-from .single.single_layer import BETTER, ROUGH, boundary_of_inside
+from .signs.sides import needed_band
+from .single.single_layer import boundary_of_inside
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
-_MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said
-_SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
-_CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
-_SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
-_CLEAN = 0.9975  # mean confidence of samples whose sheets pass through others, at least; noise of .05 cells leaves less
-_SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
 @dataclass(frozen=True)
@@ -58,138 +48,11 @@ class Surfaces:
 def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     """Cells from the surface up to which the meshes asked for need distances; at least the band asked for."""
     needed = settings.band
-    if settings.surface in _WITH_SIDES or (settings.surface == "double" and local.spacing_in_cells(grid) <= _SPARSEST):
+    if settings.surface in _WITH_SIDES or (settings.surface == "double" and local.spacing_in_cells(grid) <= SPARSEST):
         needed = max(needed, needed_band(local, grid))
     if settings.surface in ("double", "both", "single"):
         needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
     return needed
-
-
-@dataclass(frozen=True)
-class _Layers:
-    """What meshes are made of, each found when it is first asked for."""
-
-    values: np.ndarray | Blocks
-    band: NearBand
-    local: LocalSurface
-    grid: Grid
-    offset: float
-    progress: Progress
-
-    @cached_property
-    def single(self) -> SingleLayer:
-        return SingleLayer(self.values, self.band, self.local, self.grid, lambda: self.extracted, self.progress)
-
-    @property
-    def meetings(self) -> Meetings:
-        return self.single.meetings
-
-    @cached_property
-    def best_single(self) -> tuple[Mesh, int, tuple[float, float]]:
-        """The single layer for users, the number of its edges that cannot be wound alike, and :func:`misfit` of it."""
-        found = self.single.told_apart()
-        sheet, unoriented = found.with_thin_walls()
-        fit = found.fit if sheet is found.sheet[0] else misfit(sheet, self.local, self.grid.spacing)
-        return sheet, unoriented, fit
-
-    @property
-    def is_cover_better(self) -> bool:
-        """Whether the single layer is torn, and the double cover is not."""
-        worst = self.best_single[2][0]
-        return worst > 1 and self.cover_fit[0] < BETTER * worst
-
-    @cached_property
-    def cover(self) -> Mesh:
-        """The double cover."""
-        return self.both_sides if self.is_of_sheet else self.extracted
-
-    @cached_property
-    def cover_fit(self) -> tuple[float, float]:
-        """:func:`misfit` of the double cover."""
-        if not self.is_of_sheet:
-            return self.extracted_fit
-        return misfit(self.cover, self.local, self.grid.spacing) if self.meetings.side_by_side else self.single.fit
-
-    @cached_property
-    def is_of_sheet(self) -> bool:
-        """Whether the double cover is both sides of the single layer: where these are the whole surface and not torn,
-        nor even rough where sheets run side by side, and in doubt where they are closer to it than the cover extracted.
-        """
-        looked = self._may_be_sheet()
-        if looked and self._is_whole() and self.single.fit[0] <= (ROUGH if self.meetings.side_by_side else 1):
-            return True
-        return (looked or self._is_rough()) and self._is_closer()
-
-    def _is_rough(self):
-        """Whether the extracted double cover is torn, or where sheets run side by side and the surface has two sides,
-        whether it is rough, so that it may merge what the single layer parts."""
-        if self.local.spacing_in_cells(self.grid) > _SPARSEST:
-            return False
-        worst = self.extracted_fit[0]
-        return worst > _MERGED or (worst > ROUGH and self.meetings.side_by_side and self.single.of_sides is not None)
-
-    def _is_closer(self):
-        """Whether both sides of the single layer are closer to the surface than the extracted double cover."""
-        both, cover = (chamfer(mesh, self.local, self.grid.spacing) for mesh in (self.both_sides, self.extracted))
-        return both < cover
-
-    @cached_property
-    def both_sides(self) -> Mesh:
-        """Those of the single layer, without the pockets of a few faces that may be left along the lines where sheets
-        meet."""
-        cover = both_sides(self.single.sheet[0], self.grid.spacing)
-        if self.single.of_sides is not None:
-            return cover
-        return pieces_with_samples(cover, self.local.tree, self.grid.spacing)
-
-    @cached_property
-    def extracted(self) -> Mesh:
-        """The double cover extracted at an offset."""
-        part = self.progress.part(0.7, 1.0, "double cover")
-        return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
-
-    @cached_property
-    def extracted_fit(self) -> tuple[float, float]:
-        """:func:`misfit` of that."""
-        return misfit(self.extracted, self.local, self.grid.spacing)
-
-    def _may_be_sheet(self):
-        """Whether to look for a single layer. Sheets that pass through each other have one with handles, unless their
-        lines are known where it is closed, and samples are free of noise where it is not; sheets side by side have a
-        torn one, but a closed shape does not whose walls run close, or whose corners look like that."""
-        cells = self.local.spacing_in_cells(self.grid)
-        if cells > _SPARSEST or (cells < DENSE and ridge_share(self.band) < _CLOSE):
-            return False
-        if self.meetings.few:
-            return True
-        if self.meetings.pass_through:
-            if self.single.sides.complete:
-                return bool(self.meetings.passing.any())
-            if self.local.confidence[self.meetings.through].mean() < _CLEAN:
-                return False
-        return not self.meetings.side_by_side or may_be_closed(self.values, self.local, self.grid)
-
-    def _is_whole(self):
-        """Whether the single layer shows all of the surface. It does where there are two sides, and may on a one-sided
-        surface unless it falls apart, and where sheets meet if its lines are where samples show that, none of them side
-        by side, or if it has none and its borders are elsewhere. Where sheets pass through each other it has lines."""
-        if self.single.of_sides is not None:
-            return self.single.sides.complete or not self.meetings.pass_through
-        sheet = self.single.sheet[0]
-        edges, count = sheet.edge_counts()
-        border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
-        if len(line):
-            shown = self.meetings.passing.any() or self._at_meetings(sheet.vertices[line]) >= _SEEN
-            return shown and not self.meetings.side_by_side
-        if self.meetings.pass_through or pieces_touch(sheet, self.grid.spacing):
-            return False
-        if not (self.single.crossings.normal.any() and len(border)):
-            return True
-        return self._at_meetings(sheet.vertices[border]) <= _SPLIT
-
-    def _at_meetings(self, places):
-        """The share of places (m,3), at least one, whose nearest samples are where sheets meet."""
-        return self.meetings.at[self.local.tree.query(places)[1]].mean()
 
 
 def _said_of_torn(local, grid):
@@ -234,18 +97,18 @@ def extract_surfaces(
     meshes, dropped, warnings = {}, {}, []
     if settings.faces == "quads" and kind != "none":
         need_quads()
-    layers = _Layers(values, band, local, grid, settings.offset, progress)
+    choice = Choice(values, band, local, grid, settings.offset, progress)
     if kind in ("double", "both"):
-        meshes["double"] = layers.cover
-        if (missed := layers.cover_fit[1]) > _SOME:
+        meshes["double"] = choice.cover
+        if (missed := choice.cover_fit[1]) > _SOME:
             warnings.append(_said_of_missed(missed, "double cover", "they are merged"))
     if kind in ("single", "both"):
-        meshes["single"], unoriented, fit = layers.best_single
-        if layers.is_cover_better:
-            meshes["single"], unoriented = layers.cover, 0
+        meshes["single"], unoriented, fit = choice.best_single
+        if choice.is_cover_better:
+            meshes["single"], unoriented = choice.cover, 0
             warnings.append(_said_of_torn(local, grid))
         elif (missed := fit[1]) > _SOME:
-            other = "" if kind == "both" else ", or use the double cover"
+            other = "" if kind == "both" and choice.cover_fit[1] > _SOME else ", or use the double cover"
             warnings.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
         if unoriented:
             warnings.append(
@@ -253,10 +116,10 @@ def extract_surfaces(
                 "there, or sheets meet; use the double cover where both sides must show"
             )
     if kind == "signed":
-        sides, meetings = layers.single.sides, layers.single.crossings.meetings
+        sides, meetings = choice.single.sides, choice.single.crossings.meetings
         values = signed_distance(values, sides, local, place)
         part = progress.part(0.6, 1.0, "signed surface")
-        meshes["signed"] = boundary_of_inside(values, meetings, local, grid, lambda: layers.extracted, part)
+        meshes["signed"] = boundary_of_inside(values, meetings, local, grid, lambda: choice.extracted, part)
         if not sides.complete:
             warnings.append(
                 f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..linalg import cross, lengths
 from ..parallel import over_rows
+from ..parts import connected_parts
 
 AT_ONCE = 1 << 15  # faces
 
@@ -84,9 +84,7 @@ class Mesh:
 def curve_count(edges: np.ndarray) -> int:
     """Number of connected curves that edges (e,2) form."""
     corners, ends = np.unique(edges, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(corners),) * 2)
-    return connected_components(graph, directed=False)[0] if len(corners) else 0
+    return int(connected_parts(*ends.reshape(-1, 2).T, len(corners)).max(initial=-1)) + 1
 
 
 def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.surface import extract
+from core.surface.choice import Choice
 from tests import shapes
 
 RESOLUTION = 48
@@ -13,7 +13,7 @@ RESOLUTION = 48
 @pytest.fixture
 def at_offset(monkeypatch):
     """Runs that extract double covers at an offset, of surfaces with two sides as well."""
-    monkeypatch.setattr(extract._Layers, "_may_be_sheet", lambda _: False)
+    monkeypatch.setattr(Choice, "_may_be_sheet", lambda _: False)
 
 
 @pytest.fixture(scope="session")

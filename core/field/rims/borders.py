@@ -13,12 +13,11 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...linalg import row_dots
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
+from ...parts import connected_parts
 from ...progress import Progress
 from ..curvature import sag
 from .walls import walled
@@ -251,7 +250,7 @@ def chains(rims: Rims, marked) -> np.ndarray:
     n = len(marked)
     tail, head = np.repeat(np.flatnonzero(marked), 2), rims.beside[marked].reshape(-1)
     tail, head = tail[marked[head]], head[marked[head]]
-    return connected_components(coo_matrix((np.ones(len(tail), bool), (tail, head)), shape=(n, n)), directed=False)[1]
+    return connected_parts(tail, head, n)
 
 
 def chain_lengths(rims: Rims, marked) -> np.ndarray:

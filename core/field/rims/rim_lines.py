@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...linalg import row_dots
+from ...linalg import row_dots, unit
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
@@ -183,5 +183,4 @@ def _nearest_line(lines, other, cloud, across=None):
         if across is not None:
             closer &= row_dots(lines.up[of], across) < _TURNED_OFF
         found[closer], way[closer] = distance[closer], towards[closer]
-    way -= row_dots(way, normals[other])[:, None] * normals[other]
-    return way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny), found
+    return unit(way - row_dots(way, normals[other])[:, None] * normals[other]), found

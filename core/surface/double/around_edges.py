@@ -5,9 +5,9 @@ side of the next one there. The order of three sheets stays the same along a lin
 """
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from ...linalg import cross, dots, lengths, symmetric
+from ...parts import connected_parts
 from ..mesh import Mesh, edges_of, faces_across
 
 
@@ -69,7 +69,7 @@ def _strips(sheet, edge, count):
     upwards = np.bincount(edge.reshape(-1), (sheet.faces < np.roll(sheet.faces, -1, axis=1)).reshape(-1))
     linked = (upwards == 1)[inner] & (goes_on[low] | goes_on[high])[inner]
     pair = (face[linked] for face in faces_across(edge, count))
-    return connected_components(symmetric(np.ones(linked.sum()), *pair, len(sheet.faces)), directed=False)[1]
+    return connected_parts(*pair, len(sheet.faces))
 
 
 def _angles(sheet, low, high, third):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from ...linalg import cross, dots, lengths
+from ...linalg import cross, dots, lengths, unit
 from ...parallel import work_through
 from ...progress import Progress
 from ..mesh import Mesh, at_corners
@@ -45,7 +45,7 @@ def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
     beside[mesh.faces[bend.sharp[mesh.faces].any(axis=1)]] = True
     ends = np.concatenate([np.tile(np.arange(len(beside))[:, None], 2), bend.edges[beside[bend.edges].all(axis=1)]]).T
     place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
-    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), np.finfo(float).tiny)
+    outward = unit(outward)
     behind, face = _other_layer(mesh, place, outward, cell, progress)
     lack = 0.5 * np.maximum(HAIR * cell - behind, 0.0)
     step = np.zeros(len(mesh.vertices))

@@ -19,7 +19,8 @@ from ...lookup import rows_of
 from ...parallel import over_rows
 from ...progress import Progress
 from ..meshing.fillings import edge_keys
-from ..signs.sides import patches, regions_beside
+from ..signs.patches import patches
+from ..signs.sides import regions_beside
 
 _TIMES = 4  # that leaks are looked for: some show when others are shut
 _RAISED = 0.5, 1.0, 2.0, 4.0, 8.0  # cells above the level, where regions are tried

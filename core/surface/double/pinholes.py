@@ -7,14 +7,13 @@ short loops go around specks, where creases are seen from either side, for insta
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import dots, row_dots
 from ...lookup import numbered
 from ...parallel import over_rows
+from ...parts import connected_parts
 from ..mesh import AT_ONCE, at_corners
 from ..meshing.fillings import edge_keys
 
@@ -39,9 +38,7 @@ def find_pinholes(vertices, faces, step, past_rim, surface: LocalSurface, grid: 
     row = np.flatnonzero(_are_bridged(openings, surface))
     if not len(row):
         return nowhere
-    along = _ends(faces, ~turning)
-    graph = coo_matrix((np.ones(len(along[0]), bool), along), shape=(len(vertices),) * 2)
-    part = connected_components(graph, directed=False)[1]
+    part = connected_parts(*_ends(faces, ~turning), len(vertices))
     size = np.bincount(part)[part]
 
     def beside(loop):
@@ -84,8 +81,7 @@ def _loops(faces, turning):
     edge, number = numbered(edge_keys(sides, 1 + sides.max(initial=0)))
     times = turning[row].sum(axis=1)
     owner = np.repeat(np.arange(len(row)), times)
-    graph = coo_matrix((np.ones(len(owner), bool), (owner, len(row) + number)), shape=(len(row) + len(edge),) * 2)
-    part = connected_components(graph, directed=False)[1][: len(row)]
+    part = connected_parts(owner, len(row) + number, len(row) + len(edge))[: len(row)]
     closed = (np.bincount(part, times % 2) == 0) & (np.bincount(part) <= _LONGEST)
     return [row[part == number] for number in np.flatnonzero(closed)]
 

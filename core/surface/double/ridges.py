@@ -14,7 +14,7 @@ from ...field.grid import Grid
 from ...field.steps import NearBand
 from ...linalg import dots
 from ...parallel import in_order
-from ..signs.sides import patches
+from ..signs.patches import patches
 
 _DIAGONAL = np.sqrt(2)  # cells: iso-surfaces may join nodes as far apart, at opposite corners of a face
 _FACING = -0.5  # largest cosine between the steps to both: wedges wider than 60 degrees need no help

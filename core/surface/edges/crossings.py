@@ -43,16 +43,16 @@ _EDGE_AXIS = np.abs(CORNERS[_EDGES[:, 1]] - CORNERS[_EDGES[:, 0]]).argmax(axis=1
 class Crossings:
     """Grid edges that the surface crosses.
 
-    node  : (e,) int64, flat index of the edge's lower node     axis : (e,) int64, its direction
-    place : (e,3) float64, where, on the surface                cells : (c,) int64, ascending, cells near the surface
-    normal : (e,3) float64, of the sheet, where sheets meet; zero elsewhere
+    node     : (e,) int64, flat index of the edge's lower node
+    axis     : (e,) int64, its direction
+    place    : (e,3) float64, where, on the surface
+    normal   : (e,3) float64, of the sheet, where sheets meet; zero elsewhere
     meetings : Meetings of its sheets
     """
 
     node: np.ndarray
     axis: np.ndarray
     place: np.ndarray
-    cells: np.ndarray
     normal: np.ndarray
     meetings: Meetings
 
@@ -100,7 +100,6 @@ def find_crossings(
         band.node[row],
         axis,
         np.concatenate([place[crossed], meet.place[twice]]),
-        band.node[lowest],
         np.concatenate([normal[crossed], meet.normal[twice]]),
         meetings,
     )

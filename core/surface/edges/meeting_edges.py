@@ -18,11 +18,8 @@ _COVERED = 0.5  # cells, a crossing this far past the rim of its sheet is on it
 _CUTS = 1.0  # cells, past the rim of a sheet that ends others
 _ACROSS = 0.8  # largest |n . n'| of sheets that end at each other
 _BEYOND = 0.3  # local spacings, a sheet with no samples further than this past another ends there
-_GAP, _STEP, _FAR = (
-    2.0,
-    1.5,
-    2.0,
-)  # local spacings to the last sample and to the place, cells; gaps closed before a sheet
+_GAP = 2.0  # local spacings, the last samples of a sheet are this close to the one it ends at for the gap to be closed
+_STEP, _FAR = 1.5, 2.0  # local spacings and cells, places in such a gap are this close to the sheet beyond it
 _STRAIGHT = 0.7  # cosine between the way out of the sheet and the way to the other
 
 
@@ -99,12 +96,8 @@ def _along(axis, ahead, sheets, x, cell, hair):
 
 def _least(key, cost):
     """Whether each line has the least cost of those with its key, (e,) bool; the first of equals."""
-    order = np.argsort(key, kind="stable")
-    ordered, chosen = cost[order], np.zeros(len(key), bool)
-    first = np.diff(key[order], prepend=-1) > 0
-    group = np.cumsum(first) - 1
-    best = np.flatnonzero(ordered == np.minimum.reduceat(ordered, np.flatnonzero(first))[group]) if len(key) else order
-    chosen[order[best[np.diff(group[best], prepend=-1) > 0]]] = True
+    order, chosen = np.lexsort((cost, key)), np.zeros(len(key), bool)
+    chosen[order[np.diff(key[order], prepend=-1) > 0]] = True
     return chosen
 
 

@@ -8,14 +8,14 @@ sheets either run side by side or one goes on past the other's plane; where many
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_matrix
 
 from ...field.local_surface import LocalSurface
 from ...field.projection import MEMBER, TRUSTED, membership
 from ...linalg import dots, row_dots
 from ...lookup import numbered
 from ...parallel import even_chunks, in_order, over_rows
+from ...parts import connected_parts
 from ...progress import Progress
 from .sheets import SIDE_BY_SIDE
 
@@ -40,7 +40,7 @@ class Meetings:
     """Samples in whose neighbourhood there are several sheets.
 
     at      : (n,) bool
-    through : (n,) bool, samples whose sheet passes through another one, mostly some of those
+    through : (n,) bool, samples whose sheet passes through another one; nearly all are marked in `at`, too
     beside  : (n,) bool, those at meetings with another sheet that runs side by side with theirs
     passing : (n,) bool, all samples close to lines along which sheets pass through one another
     """
@@ -134,8 +134,7 @@ def _parts(marked, nearest):
     others among their `nearest` (n,k)."""
     n, of = len(nearest), np.flatnonzero(marked)
     row, column = np.nonzero(marked[nearest[of]])
-    graph = coo_matrix((np.ones(len(row), bool), (of[row], nearest[of[row], column])), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return connected_parts(of[row], nearest[of[row], column], n).astype(np.int64)
 
 
 def _linked(i, j, nearest, alike, sure):

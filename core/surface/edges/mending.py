@@ -1,11 +1,10 @@
 """Crossed grid edges, turned over until grid faces have even numbers of them, as under a surface without border."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.steps import NearBand
 from ...lookup import numbered
+from ...parts import connected_parts
 
 _ROUNDS = 3
 _MAJORITY = 3  # odd faces, of the four around an edge, that turn it over
@@ -104,8 +103,7 @@ def _short_loops(band, odd):
     """Loops of the odd faces (o,) that go from cell to cell: arrays of at most 32 of them."""
     row, across = np.divmod(odd, 3)
     cell, at = numbered(np.stack([row, band.behind[across, row]]))
-    graph = coo_matrix((np.ones(len(odd), bool), tuple(at)), shape=(len(cell),) * 2)
-    part = connected_components(graph, directed=False)[1][at[0]]
+    part = connected_parts(*at, len(cell))[at[0]]
     order = np.argsort(part, kind="stable")
     loops = np.split(odd[order], np.flatnonzero(np.diff(part[order])) + 1)
     return [loop for loop in loops if 0 < len(loop) <= _LONGEST]

@@ -1,12 +1,11 @@
 """Concave corners: between sheets that meet, faces lead from one sheet straight to the other."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
 from ...lookup import numbered
+from ...parts import connected_parts
 from ...progress import Progress
 from ..mesh import edges_of
 from .planes import to_planes
@@ -71,7 +70,7 @@ def _to_meetings(place, side, corner, other, surface, cell, progress):
     step = _onto_planes(place, place, side, corner, other)
     found = surface.project(place + step, progress.part(0.0, 0.2))
     onto, off = found.step, found.distance
-    part = connected_components(coo_matrix((np.ones(len(corner)), (corner, other)), shape=(len(off),) * 2))[1]
+    part = connected_parts(corner, other, len(off))
     chosen = np.isin(part, part[off > _MET * cell])[corner]
     row, ends = numbered(np.stack([corner, other])[:, chosen])
     if len(row):

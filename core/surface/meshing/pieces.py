@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from ...parts import connected_parts
 from ..mesh import Mesh
 
 _SAMPLE_AT = 1.5  # cells
@@ -68,9 +67,8 @@ def pieces_touch(mesh: Mesh, reach: float) -> bool:
 
 def pieces_of(mesh):
     """How many connected pieces a mesh has, all of whose vertices are in use, and the number of each vertex's, (v,)."""
-    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(mesh.vertices),) * 2)
-    return connected_components(graph, directed=False)
+    piece = connected_parts(*mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2).T, len(mesh.vertices))
+    return int(piece.max(initial=-1)) + 1, piece
 
 
 def _only(mesh, kept):

@@ -18,8 +18,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from ...field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
 from ...field.grid import Grid, node_strides
@@ -28,6 +26,7 @@ from ...linalg import conjugate_gradients, symmetric
 from ...lookup import is_among, numbered
 from ...progress import Progress
 from ..edges.crossings import Crossings
+from .patches import patches
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
@@ -37,7 +36,6 @@ _OUTSIDE = 0.5  # share of the samples with the outside on both sides, above whi
 _SPECK = 27  # nodes
 _HELD = 0.1  # of the nodes on one side, those of specks between sheets side by side, at most; more make no side
 _TOLERANCE, _STEPS = 1e-2, 1000
-_ADJACENT = 1.8  # cells, edges of one patch
 _OPEN = 0.05  # share of crossings, or of samples, with one side at both ends that a closed shape may have
 _PATCH = 0.02  # relative to all crossings, the largest flap or spanned opening that does not count
 
@@ -265,20 +263,3 @@ def _without_specks(inside, beside, surface, grid):
         small[held] = size[held].sum() > _HELD * size[1:].sum()
         inside = each(lambda here, name: here ^ small[name], inside, part)  # noqa: B023
     return inside
-
-
-def patches(middle: np.ndarray, grid: Grid, reach: float = _ADJACENT) -> np.ndarray:
-    """Number of the patch of each edge of the grid, (m,), by their middles (m,3), or of other places: those of one
-    patch are next to each other, within `reach` cells."""
-    if not len(middle):
-        return np.empty(0, np.int64)
-    pairs = KDTree(middle).query_pairs(reach * grid.spacing, output_type="ndarray")
-    return connected_components(symmetric(np.ones(len(pairs), bool), *pairs.T, len(middle)), directed=False)[1]
-
-
-def patch_lengths(patch: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Diagonals of the boxes around the places (m,3) of each patch, which have its number, (m,); one for each patch."""
-    order = np.argsort(patch, kind="stable")
-    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
-    extent = np.maximum.reduceat(place[order], first) - np.minimum.reduceat(place[order], first)
-    return np.linalg.norm(extent, axis=1)

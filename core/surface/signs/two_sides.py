@@ -29,7 +29,7 @@ from ...lookup import is_among, numbered
 from ...parallel import over_rows
 from ...progress import Progress
 from ..edges.crossings import Crossings
-from .sides import patch_lengths, patches
+from .patches import patch_lengths, patches
 from .spreading import spread_strongest
 
 _NEAR_FOLD = 24  # samples around a place, among which the other sheet of a fold is looked for

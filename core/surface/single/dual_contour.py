@@ -3,13 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import shortened
 from ...lookup import numbered
+from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
 from ..mesh import Mesh
@@ -59,8 +58,7 @@ def _without_touches(mesh, cell):
     edges = edges[length <= _TOUCH * cell]
     if not len(edges):
         return mesh
-    graph = coo_matrix((np.ones(len(edges), bool), tuple(edges.T)), shape=(len(mesh.vertices),) * 2)
-    vertex = connected_components(graph, directed=False)[1]
+    vertex = connected_parts(*edges.T, len(mesh.vertices))
     share = np.bincount(vertex)
     vertices = np.stack([np.bincount(vertex, x) / share for x in mesh.vertices.T], axis=1)
     return _without_repeats(replace(mesh, vertices=vertices, faces=vertex[mesh.faces].astype(np.int32)))

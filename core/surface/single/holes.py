@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots, row_dots
+from ...linalg import cross, dots, row_dots, unit
 from ...lookup import numbered, rows_of
+from ...parts import connected_parts
 from ..mesh import Mesh, at_corners
 from ..meshing.fillings import edge_keys, fillings
 
@@ -110,8 +111,8 @@ def _doubled(mesh, border, loops):
     tail, head, start = mesh.vertices[corner], mesh.vertices[after], mesh.vertices[[loop[0] for loop in loops]][of]
     row = rows_of(edge_keys(np.stack([corner, after], axis=1), n), key)
     length = np.linalg.norm(head - tail, axis=1) * (row >= 0)
-    axis = _unit(np.stack([np.bincount(of, x) for x in np.cross(tail - start, head - start).T], axis=1))
-    side = row_dots(_unit(np.cross(head - tail, beyond[row] - tail)), axis[of])
+    axis = unit(np.stack([np.bincount(of, x) for x in np.cross(tail - start, head - start).T], axis=1))
+    side = row_dots(unit(np.cross(head - tail, beyond[row] - tail)), axis[of])
     return np.bincount(of, length * side) / np.maximum(np.bincount(of, length), _TINY)
 
 
@@ -132,11 +133,6 @@ def _covered(mesh, triangle, loop, loops, cell):
     within = np.min([dots(cross(p, q), normal) for p, q in ((a, b), (b, c), (c, a))], axis=0) >= 0
     on = (within & (np.abs(dots(a, normal)) <= _ON * cell * size)).any(axis=1)
     return np.bincount(loop[large], on * area[large], loops) / np.maximum(total, _TINY)
-
-
-def _unit(vectors):
-    """Vectors (...,3) made unit, zero where they are."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
 
 
 def _sides(faces):
@@ -193,8 +189,7 @@ def _way(graph, start, end, avoided, farthest):
 def _without_long_loops(edges):
     """Border edges (e,2) but those of rims: longer loops than are closed, which touch nothing."""
     corner, ends = numbered(edges)
-    graph = coo_matrix((np.ones(len(edges), bool), tuple(ends.T)), shape=(len(corner),) * 2)
-    part = connected_components(graph, directed=False)[1]
+    part = connected_parts(*ends.T, len(corner))
     branched = np.bincount(part, np.bincount(ends.reshape(-1), minlength=len(corner)) != 2) > 0
     kept = branched | (np.bincount(part) <= _LONGEST)
     return edges[kept[part[ends[:, 0]]]]

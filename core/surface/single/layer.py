@@ -54,8 +54,9 @@ class SingleLayer:
 
     @cached_property
     def _crossings_and_sides(self):
-        """Those by the meetings; where no inside is bounded then, by close walls that dense samples do not show, too,
-        if one is with them. Elsewhere such walls bring lines."""
+        """Crossings and sides by the meetings. Where these bound no inside, once more with the samples that
+        :func:`beside_within_cells` finds on close walls; kept only if an inside is bounded then, since elsewhere such
+        walls bring lines of more than two faces."""
         found = self._found_by(self.meetings, self.progress.part(0.05, 0.2, "crossings"))
         if found[1].complete or found[1].share == 1:
             return found
@@ -118,10 +119,10 @@ class SingleLayer:
         return self.meetings.side_by_side and self.fit[0] > ROUGH
 
     def told_apart(self) -> "SingleLayer":
-        """This, or where it is rough, the one with sheets told apart by their room, if that is far less so, or less so
-        and misses fewer samples; the latter not if it is torn no more where this is, which the double cover stands in
-        for. It never takes the place of what lies between two sides, which has no lines; it may have some, along
-        creases."""
+        """This, or where it is rough, the one with sheets told apart by their room: if its misfit is less than half of
+        this one's; or if it is less at all, shows more of the samples, and is torn (of a misfit above 1) only where
+        this is, too: a torn one has the double cover to stand in for it. It never takes the place of what lies between
+        two sides, which has no lines of more than two faces; it may have some, along creases."""
         if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))

@@ -1,14 +1,13 @@
 """The single layer of a surface with two sides: where its signed distances are zero, as far as its rims."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.blocks import Blocks
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...lookup import numbered
+from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.first_steps import first_steps
 from ..mesh import Mesh, edge_numbers, in_use
@@ -88,6 +87,4 @@ def _connected(shared):
     """Number of the connected set of each face, (f,), where faces with the same number among their `shared` (f,k), of
     vertices or edges, are connected."""
     count, owner = len(shared), np.repeat(np.arange(len(shared)), shared.shape[1])
-    n = count + shared.max(initial=-1) + 1
-    graph = coo_matrix((np.ones(len(owner), bool), (owner, count + shared.reshape(-1))), shape=(n, n))
-    return connected_components(graph, directed=False)[1][:count]
+    return connected_parts(owner, count + shared.reshape(-1), count + shared.max(initial=-1) + 1)[:count]

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ...field.local_surface import LocalSurface
-from ...linalg import COMPONENTS, cross, lengths, principal_axes, row_dots, shortened
+from ...linalg import COMPONENTS, cross, lengths, principal_axes, row_dots, shortened, unit
 from ..mesh import Mesh, at_corners, edge_numbers
 from .rim_corners import Border
 
@@ -39,8 +39,7 @@ def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     if not len(loop):
         return mesh.vertices
     way, axis, vertices = way[loop], _axes(mesh, loop), mesh.vertices.copy()
-    way -= row_dots(way, axis)[:, None] * axis
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+    way = unit(way - row_dots(way, axis)[:, None] * axis)
     step = cell * way - surface.project(vertices[loop] + cell * way).step
     vertices[loop] += shortened(step, _TO_RIM * cell)
     return vertices

@@ -5,11 +5,10 @@ two quads with one rim, for instance.
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
+from ...parts import connected_parts
 from ..mesh import Mesh, edge_numbers
 
 _SMALL = 32  # faces of a patch
@@ -51,8 +50,7 @@ def _patches(edge, counts):
     order = np.argsort(number, kind="stable")
     owner, number = owner[order], number[order]
     pair = np.flatnonzero(number[1:] == number[:-1])
-    graph = coo_matrix((np.ones(len(pair), bool), (owner[pair], owner[pair + 1])), shape=(len(edge),) * 2)
-    return connected_components(graph, directed=False)[1]
+    return connected_parts(owner[pair], owner[pair + 1], len(edge))
 
 
 def _scraps(mesh, face, label, edge, counts, surface, cell):

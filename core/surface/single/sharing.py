@@ -5,12 +5,11 @@ within a cell have one each, also where one of them ends.
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ...field.grid import Grid, node_strides
 from ...linalg import row_dots
 from ...lookup import numbered
+from ...parts import connected_parts
 from ..edges.crossings import Crossings
 from ..edges.sheets import STEEP
 
@@ -28,8 +27,8 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
     count = np.bincount(corner, minlength=len(cell))
     first = np.cumsum(count) - count
 
-    links = [(order, order[first[corner[order]]])]
-    links[0] = tuple(end[~mixed[corner[order]]] for end in links[0])
+    plain = order[~mixed[corner[order]]]
+    links = [(plain, order[first[corner[plain]]])]
     steep = np.zeros(len(cell), bool)
     for i in range(count[mixed].max(initial=0)):
         for j in range(i + 1, count[mixed].max(initial=0)):
@@ -38,9 +37,7 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
             same, meet = _compare(crossings, owner[a], owner[b], grid.spacing)
             steep[row[meet]] = True
             links.append((a[same | meet], b[same | meet]))
-    a, b = (np.concatenate(ends) for ends in zip(*links, strict=True))
-    graph = coo_matrix((np.ones(len(a), bool), (a, b)), shape=(len(corner),) * 2)
-    _, vertex = connected_components(graph, directed=False)
+    vertex = connected_parts(*(np.concatenate(ends) for ends in zip(*links, strict=True)), len(corner))
 
     open_cell = np.zeros(len(cell), bool)
     open_cell[corner[_at_end(vertex, corner, cell, crossings, owner, grid)]] = True

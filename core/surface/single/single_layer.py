@@ -19,7 +19,8 @@ from ..mesh import Mesh
 from ..meshing.centring import centred
 from ..meshing.misfit import chamfer, misfit
 from ..signed import signed_mesh
-from ..signs.sides import Sides, patch_lengths, patches
+from ..signs.patches import patch_lengths, patches
+from ..signs.sides import Sides
 from ..signs.two_sides import LONG, two_sided
 from ..signs.zero_set import sharpened
 from .dual_contour import dual_contour
@@ -42,7 +43,16 @@ _BORDERED = 0.5  # edges of such borders for each of the line, at most; where th
 def single_layer(
     values, band: NearBand, crossings: Crossings, sides: Sides, surface: LocalSurface, grid: Grid, progress=None
 ) -> tuple[Mesh, int]:
-    """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`."""
+    """The surface as one sheet: :func:`sheet_of_sides`, and where there is none :func:`sheet_of_crossings`.
+
+    values    : (nx,ny,nz) float32 or Blocks, unsigned distances at the grid's nodes, units of the samples
+    band      : the nodes near the surface
+    crossings : where the surface crosses the grid's edges     sides : the inside that these bound, if any
+
+    Returns the mesh, in units of the samples, and the number of its edges across which it cannot be wound alike. A
+    whole run goes on from here where sheets run side by side and this is rough, see :class:`.layer.SingleLayer`.
+    Raises :class:`SettingsError` where a double cover is needed and the box has no room for it.
+    """
     progress = Progress.of(progress)
     two_sides = cache(lambda: two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.1)))
     between = sheet_between_sides(two_sides, band, crossings, sides, surface, grid, progress.part(0.1, 0.3))

@@ -11,7 +11,8 @@ from core.points import local_spacing
 from core.progress import Progress
 from core.surface.edges.crossings import Crossings
 from core.surface.edges.meetings import Meetings
-from core.surface.signs.sides import Sides, _numbered, _sides, find_sides, may_be_closed, patch_lengths
+from core.surface.signs.patches import patch_lengths
+from core.surface.signs.sides import Sides, _numbered, _sides, find_sides, may_be_closed
 from tests import shapes
 
 NO_MEETINGS = Meetings(*np.zeros((4, 1500), bool))
@@ -33,12 +34,12 @@ def crossings_of(inside):
         node.append(np.delete(flat, -1, axis=a)[change])
         axis.append(np.full(change.sum(), a))
     node, axis = np.concatenate(node), np.concatenate(axis)
-    return Crossings(node, axis, GRID.positions(node), np.empty(0, int), np.zeros((len(node), 3)), NO_MEETINGS)
+    return Crossings(node, axis, GRID.positions(node), np.zeros((len(node), 3)), NO_MEETINGS)
 
 
 def without(crossings, dropped):
     kept = (array[~dropped] for array in (crossings.node, crossings.axis, crossings.place))
-    return Crossings(*kept, crossings.cells, crossings.normal[~dropped], NO_MEETINGS)
+    return Crossings(*kept, crossings.normal[~dropped], NO_MEETINGS)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +95,6 @@ def test_an_inner_wall_has_the_inside_on_both_faces(surface):
         np.concatenate([crossings.node, wall]),
         np.concatenate([crossings.axis, np.full(len(wall), 2)]),
         np.concatenate([crossings.place, GRID.positions(wall)]),
-        crossings.cells,
         np.zeros((len(crossings.node) + len(wall), 3)),
         NO_MEETINGS,
     )
@@ -120,7 +120,6 @@ def ball_and_square(share):
         np.append(around.node, above),
         np.append(around.axis, np.full(len(above), 2)),
         np.zeros((len(around.node) + len(above), 3)),
-        around.cells,
         np.zeros((len(around.node) + len(above), 3)),
         NO_MEETINGS,
     )

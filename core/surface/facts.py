@@ -1,0 +1,33 @@
+"""What the report tells of meshes."""
+
+from ..parallel import in_order
+from ..progress import Progress
+from .extract import Surfaces
+from .mesh import curve_count
+from .meshing.pieces import piece_count
+from .meshing.quality import quad_quality, triangle_quality
+
+
+def _edge_facts(mesh):
+    edges, count = mesh.edge_counts()
+    return {"borders": curve_count(edges[count == 1]), "nonmanifold_edges": int((count > 2).sum())}
+
+
+_FACTS = (  # what takes longest first, as they are found side by side
+    triangle_quality,
+    _edge_facts,
+    lambda mesh: {"pieces": piece_count(mesh)},
+    quad_quality,
+)
+
+
+def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
+    """What the report tells of each mesh, by kind."""
+    facts, progress, kinds = {}, Progress.of(progress), len(surfaces.meshes)
+    for number, (kind, mesh) in enumerate(surfaces.meshes.items()):
+        facts[kind] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
+        facts[kind] |= {"pieces_dropped": surfaces.dropped[kind]}
+        asked = progress.part(number / kinds, (number + 1) / kinds).each(_FACTS)
+        for _, found in in_order(lambda fact, mesh=mesh: fact(mesh), asked):
+            facts[kind] |= found
+    return facts
