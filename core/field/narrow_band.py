@@ -5,17 +5,16 @@ Next to the surface the distance is the projection's, and further out that to th
 the whole box (see :mod:`.integration`).
 """
 
-from dataclasses import fields
-
 import numpy as np
 
 from ..progress import Progress
+from ..records import joined
 from .blocks import SIDE, Blocks, blocks_of, table_shape
 from .feet import Feet, no_farther_than_feet, settled_feet
 from .grid import CORNERS, Grid
 from .groups import HALF, MARGIN, groups_near
 from .integration import BAND
-from .local_surface import LocalSurface, Projection
+from .local_surface import LocalSurface
 from .near_nodes import sample_reach
 from .outwards import carried_outwards
 from .projection import FROM_NODES
@@ -66,8 +65,7 @@ def _projected(surface, groups, progress):
         found.append((node[inside], projection[inside]))
     node = np.concatenate([node for node, _ in found])
     order = np.argsort(node)
-    parts = ([getattr(near, field.name) for _, near in found] for field in fields(Projection))
-    return node[order], Projection(*(np.concatenate(each)[order] for each in parts))
+    return node[order], joined([near for _, near in found])[order]
 
 
 def _feet(surface, grid, node, near, progress):

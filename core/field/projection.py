@@ -11,6 +11,7 @@ import numpy as np
 from ..linalg import dots, quadratic_form, row_dots
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
+from ..records import picked
 from .diffusion import fused_axes, kernel_weights
 
 NEAREST = 12  # of a query, that it is projected with
@@ -56,7 +57,7 @@ class Projection:
         return self.step / np.maximum(self.distance, np.finfo(float).tiny)[:, None]
 
     def __getitem__(self, chosen) -> "Projection":
-        return Projection(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        return picked(self, chosen)
 
     def __setitem__(self, chosen, found: "Projection"):
         for field in fields(self):

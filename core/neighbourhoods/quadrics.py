@@ -8,6 +8,7 @@ from scipy.spatial import KDTree
 from ..linalg import COMPONENTS, dots, principal_axes, row_dots, solve_positive, tangent_frames
 from ..parallel import even_chunks, in_order
 from ..progress import Progress
+from ..records import joined
 from .clusters import Clusters
 
 GAUSS = 1.4826  # standard deviations in a median absolute error
@@ -109,16 +110,11 @@ def _through(points, places, sizes, way, progress):
                 some = slice(first, first + step)
                 yield way([x[some, :k].copy() for x in offset], distance[some, :k].copy())
 
-        return [_joined(list(pieces(k))) for k in sizes]
+        return [joined(list(pieces(k))) for k in sizes]
 
     chunks = even_chunks(len(places), max(1, _QUERIED // most), Progress.of(progress))
     parts = [found for _, found in in_order(fit, chunks)]
-    return [_joined(found) for found in zip(*parts, strict=True)]
-
-
-def _joined(pieces):
-    columns = zip(*(vars(piece).values() for piece in pieces), strict=True)
-    return type(pieces[0])(*map(np.concatenate, columns))
+    return [joined(found) for found in zip(*parts, strict=True)]
 
 
 def _quadrics(offset, distance):

@@ -9,7 +9,7 @@ Neighbours beyond a crease are unfolded about the line where the two tangent pla
 other, and that line is where the patch ends, unless the sheet goes on straight (two sheets that cross).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...parts import connected_parts
 from ...progress import Progress
+from ...records import joined
 from ..curvature import sag
 from .walls import walled
 
@@ -85,7 +86,7 @@ def find_rims(cloud: Cloud, bend, bridge: float, progress=None) -> Rims:
     """
     chunks = Progress.of(progress).chunks(len(cloud), rows_at_a_time(bridge, len(cloud)))
     found = [rims for _, rims in in_order(lambda part: _find_rims(part, cloud, bend, bridge), chunks)]
-    return Rims(*(np.concatenate([getattr(rims, field.name) for rims in found]) for field in fields(Rims)))
+    return joined(found)
 
 
 def _find_rims(part, cloud, bend, bridge):

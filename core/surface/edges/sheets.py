@@ -4,7 +4,7 @@ The near band knows the nearest sheet of each node only. Where sheets meet, each
 that crossings of one are not taken for crossings of the other.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -14,6 +14,7 @@ from ...field.projection import CHUNK, MEMBER, TRUSTED, seen_from, sheet_foot
 from ...linalg import row_dots
 from ...parallel import even_chunks, in_order
 from ...progress import Progress
+from ...records import joined, picked
 
 _NEAREST = 16  # samples of a node
 _SHEETS = 3  # of a node, at first
@@ -50,12 +51,11 @@ class Sheets:
         return len(self.node)
 
     def __getitem__(self, chosen) -> "Sheets":
-        return Sheets(*[getattr(self, field.name)[chosen] for field in fields(self)])
+        return picked(self, chosen)
 
     def joined(self, *others: "Sheets") -> "Sheets":
         """These and others after them."""
-        parts = [self, *others]
-        return Sheets(*[np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(self)])
+        return joined([self, *others])
 
     def span(self, nodes: int) -> tuple[np.ndarray, np.ndarray]:
         """First pair of each node and their number, (nodes,) each."""
