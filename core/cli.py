@@ -274,7 +274,7 @@ def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
         try:
             write(path)
             report["files"].append(path)
-        except MissingDependency as error:
+        except (InputError, MissingDependency) as error:
             report["warnings"].append(f"{path} is not written: {error}")
     report["files"].append(summary)
     write_report(summary, report)

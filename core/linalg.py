@@ -120,8 +120,8 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 def shortened(steps: np.ndarray, longest: float | np.ndarray) -> np.ndarray:
     """Vectors (m,3), those that are longer than `longest`, (m,) or one for all, made as long as that."""
-    length = np.maximum(np.linalg.norm(steps, axis=1), np.finfo(float).tiny)
-    return steps * np.minimum(1.0, longest / length)[:, None]
+    length = np.maximum(np.linalg.norm(steps, axis=1), longest)
+    return steps * (longest / np.maximum(length, np.finfo(float).tiny))[:, None]
 
 
 def lengths(a: np.ndarray) -> np.ndarray:

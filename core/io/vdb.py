@@ -5,12 +5,13 @@ import struct
 
 import numpy as np
 
-from ..errors import VADError
+from ..errors import InputError, VADError
 from ..field.blocks import each, node_gradient
 from ..field.distance_field import BandedField, DistanceField
 from .atomic import atomic_path
 from .openvdb_module import fill, load_openvdb
 
+_SMALLEST = 1.5e-5  # the cube of a voxel's size counts as zero below 3e-15
 _FOG_CELLS = 2.0  # the visible fog fades out at this distance from the surface
 
 
@@ -24,9 +25,15 @@ def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradi
     gradient : (only if asked) vectors along which the distance grows, unit-free, by central differences; within a band
                zero for its last cell
 
-    Raises :class:`MissingDependency` without OpenVDB, :class:`VADError` where the file cannot be written whole.
+    Raises :class:`MissingDependency` without OpenVDB, :class:`InputError` for cells smaller than it takes,
+    :class:`VADError` where the file cannot be written whole.
     """
     openvdb = load_openvdb()
+    if field.spacing < _SMALLEST:
+        raise InputError(
+            f"cells are {field.spacing:.2g} wide, and OpenVDB takes none smaller than {_SMALLEST:g}; give the points "
+            "in smaller units"
+        )
     grids = _grids(openvdb, field, gradient)
     with atomic_path(path) as temporary:
         openvdb.write(str(temporary), grids=grids)

@@ -294,6 +294,15 @@ def test_without_openvdb_the_rest_is_delivered_with_a_warning(capsys, scan, call
     assert REPORT["warnings"] == []
 
 
+def test_a_scan_too_small_for_openvdb_has_the_rest_with_a_warning(capsys, tmp_path):
+    points = np.random.default_rng(0).normal(size=(200, 3))
+    np.savetxt(tmp_path / "ball.xyz", 1e-5 * points / np.linalg.norm(points, axis=1, keepdims=True))
+    status, _, err = run(capsys, "reconstruct", tmp_path / "ball.xyz", "-o", tmp_path / "out", "--resolution", "16")
+    assert status == 0
+    assert sorted(os.listdir(tmp_path / "out")) == ["ball.json", "ball_double.ply", "ball_points.ply"]
+    assert "ball.vdb is not written: cells are" in err
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("presses", [1, 2])
 def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkeypatch, presses, number):

@@ -187,6 +187,13 @@ def test_objects_as_far_apart_as_numbers_reach(distance):
     assert_sound(reconstruct(tori, Settings(resolution=RESOLUTION, outliers=False)), tori)
 
 
+def test_a_few_points_in_one_cell_beside_one_far_away():
+    """Thousands of spacings off the cluster, where its kernels are all zero."""
+    points = 0.01 * np.random.default_rng(4).normal(size=(8, 3))
+    points[2] = [1000, 0, 0]
+    assert_sound(reconstruct(points, Settings(resolution=RESOLUTION)), points)
+
+
 def test_two_far_apart_objects_are_both_kept():
     points = np.vstack([shapes.sphere(500), shapes.sphere(500) + 30])
     result = reconstruct(points, Settings(resolution=64))

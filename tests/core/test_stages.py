@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 import core
 from core import (
     InputError,
     Settings,
     SettingsError,
+    both_sides,
     denoise,
     distance_field,
     double_cover,
@@ -140,3 +142,23 @@ def test_stages_follow_scale_and_place(scale, centre):
     for mesh in (double_cover(values, near, surface, grid, 0.5), sheet):
         assert (mesh.edge_counts()[1] == 2).all()
         assert shapes.sphere_distance((mesh.vertices - centre) / scale).max() < 0.02
+
+
+@pytest.mark.parametrize("shape", [shapes.disc(300), shapes.junction(400)], ids=["disc", "junction"])
+@pytest.mark.parametrize("scale", [1e-9, 1e3, 1e9])
+def test_meshes_of_open_shapes_follow_the_scale(shape, scale):
+    """None of what is divided by lengths that may be zero passes what numbers can hold."""
+
+    def meshes(points):
+        normals, confidence, _ = estimate_normals(points, local_spacing(points))
+        surface = fit_local_surface(points, normals, confidence, local_spacing(points), bridge=3)
+        grid = fit_grid(points, 24)
+        values, near = distance_field(surface, grid)
+        crossings = find_crossings(near, surface, grid)
+        sides = find_sides(values, crossings, surface, grid)
+        sheet, _ = single_layer(values, near, crossings, sides, surface, grid)
+        return sheet, both_sides(sheet, grid.spacing), double_cover(values, near, surface, grid, 1.0)
+
+    for found, expected in zip(meshes(scale * shape), meshes(shape), strict=True):
+        assert abs(len(found.faces) - len(expected.faces)) < 0.02 * len(expected.faces)
+        assert KDTree(expected.vertices).query(found.vertices / scale)[0].max() < 0.05

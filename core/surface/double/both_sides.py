@@ -26,12 +26,17 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
         return sheet
     sheet = _turned(sheet)
     sides = _sides(sheet)
+    whole = sides.whole_quads(sheet.pairs)
+    if not whole.all():
+        sheet = sheet.of_faces(np.ones(len(sheet.faces), bool), whole)
+        sides = _sides(sheet)
     place = np.empty(sides.vertex.max(initial=-1) + 1, sheet.faces.dtype)
     place[sides.vertex] = sheet.faces
     vertices = np.concatenate([sheet.vertices[place], sheet.vertices[sides.halved].mean(axis=0)])
     a, b, c = at_corners(sheet.vertices, sheet.faces)
     normal = np.stack([_totals(x, sides, len(vertices)) for x in cross(b - a, c - a)])
-    normal *= 0.5 * HAIR * cell / np.maximum(lengths(normal), np.finfo(float).tiny)  # at borders both sides cancel
+    size = lengths(normal)
+    normal *= 0.5 * HAIR * cell / np.where(size > 0, size, 1.0)  # at borders both sides cancel
     return _joined(vertices + normal.T, sides, sheet.pairs)
 
 
@@ -48,6 +53,12 @@ class _Sides:
     vertex: np.ndarray
     middle: np.ndarray
     halved: np.ndarray
+
+    def whole_quads(self, pairs: int) -> np.ndarray:
+        """Which of the sheet's quads have both their halves joined along the diagonal on either side, (pairs,) bool. It
+        is an edge of further faces where sheets meet along it."""
+        first, second = self.vertex[:, :pairs], self.vertex[:, pairs : 2 * pairs]
+        return ((first[..., 0] == second[..., 0]) & (first[..., 2] == second[..., 1])).all(axis=0)
 
 
 def _sides(sheet):

@@ -68,9 +68,9 @@ class Border:
         for walked, further, _, start, stop in self._walk(side, ends[-1]):
             for half, (first, last) in enumerate(pairwise(ends)):
                 begin, end = np.clip(walked, first, last), np.clip(further, first, last)
-                share = (0.5 * (begin + end) - walked) / np.maximum(further - walked, _TINY)
-                part = end - begin
-                total[half] += part[:, None] * (start + np.clip(share, 0, 1)[:, None] * (stop - start))
+                size, part = further - walked, end - begin
+                share = np.clip(0.5 * (begin + end) - walked, 0, size) / np.maximum(size, _TINY)
+                total[half] += part[:, None] * (start + share[:, None] * (stop - start))
                 length[half] += part
             gone = further
         near, far = total / np.maximum(length, _TINY)[..., None]

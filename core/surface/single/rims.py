@@ -99,7 +99,8 @@ def _outward(vertices, faces):
     squared = np.maximum(row_dots(along, along), np.finfo(float).tiny)
     out = vertices[tail] - vertices[third]
     out -= (row_dots(out, along) / squared)[:, None] * along
-    out *= (np.sqrt(squared) / np.maximum(np.linalg.norm(out, axis=1), np.finfo(float).tiny))[:, None]
+    size = np.linalg.norm(out, axis=1)
+    out *= (np.sqrt(squared) / np.where(size > 0, size, 1.0))[:, None]
     ends = np.concatenate([tail, head])
     return np.stack([np.bincount(ends, np.tile(out[:, a], 2), len(vertices)) for a in range(3)], axis=1)
 

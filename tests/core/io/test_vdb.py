@@ -4,7 +4,7 @@ import resource
 import numpy as np
 import pytest
 
-from core import BandedField, DistanceField, MissingDependency, VADError
+from core import BandedField, DistanceField, InputError, MissingDependency, VADError
 from core.field.blocks import blocks_of, table_shape
 from core.field.feet import Feet
 from core.io.openvdb_module import load_openvdb
@@ -48,6 +48,16 @@ def test_udf_comes_back_exactly_in_its_place(openvdb, tmp_path, band):
     for node in [(0, 0, 0), (19, 5, 7)]:
         np.testing.assert_allclose(udf.transform.indexToWorld(node), ORIGIN + SPACING * np.array(node), rtol=1e-15)
         np.testing.assert_allclose(density.transform.indexToWorld(node), udf.transform.indexToWorld(node))
+
+
+def test_cells_too_small_for_openvdb_are_refused(openvdb, tmp_path):
+    values = np.ones((4, 4, 4), np.float32)
+    write_vdb(tmp_path / "field.vdb", DistanceField(values, np.zeros(3), 1.5e-5))
+    with pytest.raises(
+        InputError, match=r"cells are 1.4e-05 wide, .* smaller than 1.5e-05; give the points in smaller"
+    ):
+        write_vdb(tmp_path / "other.vdb", DistanceField(values, np.zeros(3), 1.4e-5))
+    assert not (tmp_path / "other.vdb").exists()
 
 
 def test_signed_distances_are_a_level_set_named_sdf(openvdb, tmp_path):

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from core import Mesh, Settings, both_sides, reconstruct
-from core.surface import extract
+from core.surface import choice
 from core.surface.double.layers import HAIR
 from core.surface.meshing import misfit
 from core.surface.meshing.misfit import askew, distances
@@ -180,6 +180,19 @@ def test_layers_are_a_hair_apart_and_meet_at_the_border():
     np.testing.assert_array_equal(cover.vertices[~inside, 2], 0)
 
 
+def test_quads_whose_diagonal_is_an_edge_of_further_faces_are_triangles():
+    """Two of four, along whose diagonals a third sheet meets their halves; the others stay."""
+    sheet = strip(2, 2)
+    vertices = np.concatenate([sheet.vertices, [[1.0, 1.0, 1.0]]])
+    sheet = Mesh(vertices, np.concatenate([sheet.faces, [[0, 4, 9], [4, 8, 9]]]).astype(np.int32), sheet.pairs)
+    cover = both_sides(sheet, CELL)
+    assert cover.pairs == 2 * 2
+    assert is_closed_manifold(cover)
+    sides = [face for faces in (cover.quads, cover.triangles) for face in faces.tolist()]
+    directed = [(face[k - 1], face[k]) for face in sides for k in range(len(face))]
+    assert sorted(directed) == sorted((head, tail) for tail, head in directed)
+
+
 def test_the_outer_layer_of_a_closed_sheet_faces_out():
     volumes = sorted(shapes.signed_volume(piece) for piece in shapes.components(both_sides(octahedron(), CELL)))
     np.testing.assert_allclose(volumes, [-4 / 3, 4 / 3], rtol=1e-3)
@@ -345,7 +358,7 @@ def test_a_run_leaves_a_torn_sheet_alone(monkeypatch):
     assert is_of_sheet(reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both")))
     monkeypatch.setattr(misfit, "_TORN", 1e-9)
     for both, cover in ((1, 2), (2, 1)):
-        monkeypatch.setattr(extract, "chamfer", lambda *_, told=iter([both, cover]): next(told))
+        monkeypatch.setattr(choice, "chamfer", lambda *_, told=iter([both, cover]): next(told))
         run = reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both"))
         assert is_of_sheet(run) == (both < cover)
 
@@ -361,7 +374,7 @@ def test_in_doubt_the_cover_that_is_closer_to_the_surface_is_taken(monkeypatch, 
     points = on_faces(truth, 1200 * len(pages))
     off = []
     for sign in (1, -1):
-        monkeypatch.setattr(extract, "chamfer", lambda *given, sign=sign: sign * misfit.chamfer(*given))
+        monkeypatch.setattr(choice, "chamfer", lambda *given, sign=sign: sign * misfit.chamfer(*given))
         cover = reconstruct(points, Settings(resolution=40)).surface
         off.append(exact_distances(on_faces(cover, 4000), truth).mean() + exact_distances(points, cover).mean())
     assert off[0] < 0.8 * off[1]
