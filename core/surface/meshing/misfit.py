@@ -25,7 +25,7 @@ def misfit(mesh: Mesh, surface: LocalSurface, cell: float) -> tuple[float, float
 def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray | None = None) -> float:
     """Chamfer distance between a mesh and the surface, in cells: the mean distance of the samples to the mesh, and that
     of the mesh, by the area of 4096 and more of its faces, to where the field has the surface; infinite for a mesh
-    without faces. `points` (n,3) are the samples, where not all of them count.
+    without area. `points` (n,3) are the samples, where not all of them count.
 
     Either alone would choose wrong: the first does not see faces where nothing is, the second not what is missing.
     """
@@ -33,8 +33,8 @@ def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray |
         return np.inf
     a, b, c = at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)])
     area, off = lengths(cross(b - a, c - a)), surface.project(((a + b + c) / 3).T).distance
-    points = surface.points if points is None else points
-    return (distances(mesh, points).mean() + off @ area / area.sum()) / cell
+    points, total = surface.points if points is None else points, area.sum()
+    return (distances(mesh, points).mean() + off @ area / total) / cell if total else np.inf
 
 
 def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:

@@ -89,3 +89,4 @@ def onto_the_ground(x):
 def test_no_faces_are_infinitely_far():
     surface = SimpleNamespace(points=np.zeros((1, 3)), project=onto_the_ground)
     assert chamfer(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), surface, 1.0) == np.inf
+    assert chamfer(Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32)), surface, 1.0) == np.inf
