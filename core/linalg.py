@@ -151,7 +151,7 @@ def conjugate_gradients(
 ) -> np.ndarray:
     """The u that a symmetric, positive (semi)definite `apply` takes to `right`, arrays of one shape, from `start` on
     until the residual is at most `tolerance` times as large as `right`, or the `steps` end (G. H. Golub and C. F. Van
-    Loan, Matrix Computations, section 11.5). SciPy's sums by BLAS."""
+    Loan, Matrix Computations, section 11.5). SciPy has the same, but sums by BLAS."""
     u, residual = start.copy(), right - apply(start)
     goal = tolerance * np.sqrt(inner(right, right))
     search = z = precondition(residual)

@@ -10,10 +10,8 @@ from .surroundings import NEIGHBOURS, SHEET, Surroundings, thickness
 _GAP = 4.0  # times the local spacing on either side, that separates parts
 _OF_ALL, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part: larger ones are no strays
 _LOOKS = 256  # samples of a part whose wider neighbourhoods are looked at
-_FURTHER, _BESIDE = (
-    64,
-    3.5,
-)  # samples nearest to each of a part, itself among them; others so many spacings of either away are beside it
+_FURTHER = 64  # samples nearest to each of a part, itself among them
+_BESIDE = 3.5  # spacings of either, others of these closer than that are beside the part
 _ENOUGH = 16  # samples, of which fewer do not tell a shell from a cloud
 _HULL = 0.95, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
 _CHUNK = 8192  # samples

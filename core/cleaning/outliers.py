@@ -22,11 +22,7 @@ _LONELY = 2.0  # spacing over that of the neighbours
 _ALONE = 5.0  # so lonely that the plane no longer matters
 _OFF = 2.0  # distance from the neighbours' plane over their spacing
 _ASTRAY, _FEW = 0.01, 5  # share and number of samples off all wires above which they are strays: ends of wires are, too
-_AT_ITS_HEIGHT = (
-    24,
-    6,
-    0.15,
-)  # samples, itself among them; so many others of them this close to its height, over their spacing, are a sheet
+_AT_ITS_HEIGHT = 24, 6, 0.15  # samples with itself; so many this close to its height, over their spacing, are a sheet
 _PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
 _MANY_PROUD = 0.00125  # share of such samples above which they are strays: corners have some
 _COMPANY = 40  # sparse samples that vote whether they are strays

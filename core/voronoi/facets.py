@@ -33,7 +33,7 @@ HEEDED = 2 * math.hypot(CLIP_RADIUS, REACH / 2)  # local spacings, radius of the
 
 _NEGLIGIBLE = 1e-9  # squared clip radii
 _JITTER = 1e-6  # local spacings
-_FARTHEST = 1e6  # half boxes, circumcentres of flat tetrahedra
+_FARTHEST = 1e6  # half boxes, to which circumcentres of flat tetrahedra are brought in
 _CORNER_DISTANCE = 5.0  # half boxes; from 3 on the tetrahedron holds the box
 
 _TETRAHEDRON = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
