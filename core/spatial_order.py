@@ -18,11 +18,12 @@ _SPREAD = (  # shifts, and the bits kept after each, that leave two between thos
 
 def spatial_order(points: np.ndarray) -> np.ndarray:
     """Rows (n,) int64 of points (n,3) along a Z-order curve (G. M. Morton, IBM, 1966) through 2^21 cells on the longest
-    side of their box; points in one cell stay in the order given."""
+    side of their box; points in one cell, of which a stray may leave few, are in the order of their coordinates. So
+    the order given matters to copies alone."""
     low = points.min(axis=0)
     side = max((points.max(axis=0) - low).max(), np.finfo(float).tiny)
     bits = ((points - low) / side * (2**_BITS - 1)).astype(np.uint64)
     for shift, kept in _SPREAD:
         bits = (bits | bits << np.uint64(shift)) & np.uint64(kept)
     x, y, z = bits.T
-    return np.argsort(x << np.uint64(2) | y << np.uint64(1) | z, kind="stable")
+    return np.lexsort((*points.T[::-1], x << np.uint64(2) | y << np.uint64(1) | z))

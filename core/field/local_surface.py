@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..errors import InputError
 from ..given_arrays import finite_points, spacing_of
 from ..linalg import COMPONENTS
 from ..neighbourhoods.close_sheets import sheet_room
@@ -22,6 +23,7 @@ from .rims.rim_lines import with_rim_lines
 from .rims.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 
 _AROUND = 32  # samples, whose median spacing is that of a place
+_SMALLEST, _LARGEST = 1e-15, 1e15  # span of the points
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,15 @@ class LocalSurface:
 def fit_local_surface(points, normals, confidence, spacing, bridge: float, progress=None) -> LocalSurface:
     """Patches and rims of distinct samples (n,3) with axes (n,3) of any length, their confidence (n,) in [0,1] and
     local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Raises :class:`InputError` for
-    other shapes, what is not finite, axes without a direction and spacings not above 0."""
+    other shapes, what is not finite, axes without a direction, spacings not above 0, and points that span more or less
+    than single precision holds the squares of."""
     progress, points = Progress.of(progress), finite_points(points, least=2)
+    span = float(np.ptp(points, axis=0).max())
+    if not _SMALLEST < span < _LARGEST:
+        raise InputError(
+            f"the points span {span:g}; squares of distances in single precision need a span from {_SMALLEST:g} to "
+            f"{_LARGEST:g}, so scale them to an ordinary size"
+        )
     normals, confidence = known_normals((normals, confidence), len(points), slice(None))
     spacing = spacing_of(points, spacing)
     cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))

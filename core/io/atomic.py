@@ -18,6 +18,8 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     (folder missing or not writable, disk full) becomes a :class:`VADError` of one line.
     """
     path = Path(path)
+    if not path.name:
+        raise VADError(f"'{path}' is a folder; give the path of a file")
     temporary = path.with_name(f".{uuid4().hex}{path.suffix}")
     try:
         yield temporary

@@ -50,7 +50,7 @@ def are_colours(values: np.ndarray) -> bool:
 
 
 def _are_bytes(values):
-    return ((values >= 0) & (values <= 255) & (values % 1 == 0)).all()
+    return ((values >= 0) & (values <= 255) & (values == np.rint(values))).all()
 
 
 def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

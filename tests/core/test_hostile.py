@@ -187,6 +187,14 @@ def test_objects_as_far_apart_as_numbers_reach(distance):
     assert_sound(reconstruct(tori, Settings(resolution=RESOLUTION, outliers=False)), tori)
 
 
+def test_beside_a_far_outlier_the_order_of_the_points_changes_no_byte():
+    points = np.vstack([shapes.scattered_sphere(400), [[1e8, 0, 0]]])
+    order = np.random.default_rng(1).permutation(len(points))
+    one, other = (reconstruct(x, Settings(resolution=RESOLUTION)) for x in (points, points[order]))
+    np.testing.assert_array_equal(one.field.values, other.field.values)
+    np.testing.assert_array_equal(one.surface.vertices, other.surface.vertices)
+
+
 def test_a_few_points_in_one_cell_beside_one_far_away():
     """Thousands of spacings off the cluster, where its kernels are all zero."""
     points = 0.01 * np.random.default_rng(4).normal(size=(8, 3))

@@ -19,10 +19,18 @@ def test_points_that_follow_each_other_are_close():
     assert np.median(step) < 3 * np.sqrt(4 * np.pi / len(points))
 
 
-def test_points_in_one_cell_stay_in_order():
+def test_points_in_one_cell_are_in_the_order_of_their_coordinates():
     two = np.tile([[1.0, 2.0, 3.0], [0.0, 2.0, 3.0]], (3000, 1)) + np.linspace(1e-8, 0, 6000)[:, None]
     points = np.concatenate([[[-1.3, -1.3, -1.3]], two, [[5.1, 5.1, 5.1]]])
-    np.testing.assert_array_equal(spatial_order(points), [0, *range(2, 6002, 2), *range(1, 6001, 2), 6001])
+    np.testing.assert_array_equal(spatial_order(points), [0, *range(6000, 0, -2), *range(5999, 0, -2), 6001])
+    level = np.array([[1e9, 0, 0], [0, 2, 1], [0, 1, 2], [0, 1, 1.0]])
+    np.testing.assert_array_equal(spatial_order(level), [3, 2, 1, 0])
+
+
+def test_the_order_given_does_not_matter(random):
+    points = np.concatenate([shapes.scattered_sphere(400), [[1e8, 0, 0]]])
+    order = random.permutation(len(points))
+    np.testing.assert_array_equal(points[order][spatial_order(points[order])], points[spatial_order(points)])
 
 
 def test_place_and_scale_do_not_matter_nor_does_a_point_alone():

@@ -96,6 +96,9 @@ def test_stages_alone_refuse_what_a_run_refuses():
     ):
         with pytest.raises(InputError, match=message):
             fit_local_surface(points, normals, confidence, spacing, 3.0)
+    for size in (1e-20, 1e20):
+        with pytest.raises(InputError, match=r"the points span .* from 1e-15 to 1e\+15"):
+            fit_local_surface(size * points, points, np.ones(300), size * spacing, 3.0)
     surface = fit_local_surface(points.tolist(), points.tolist(), [1] * 300, spacing, 3.0)
     for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
         with pytest.raises(SettingsError, match="is 'foo'; choose one of"):
@@ -145,7 +148,7 @@ def test_stages_follow_scale_and_place(scale, centre):
 
 
 @pytest.mark.parametrize("shape", [shapes.disc(300), shapes.junction(400)], ids=["disc", "junction"])
-@pytest.mark.parametrize("scale", [1e-9, 1e3, 1e9])
+@pytest.mark.parametrize("scale", [1e-12, 1e3, 1e9, 1e12])
 def test_meshes_of_open_shapes_follow_the_scale(shape, scale):
     """None of what is divided by lengths that may be zero passes what numbers can hold."""
 

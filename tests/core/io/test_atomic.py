@@ -64,6 +64,14 @@ def test_an_impossible_target_is_refused(tmp_path, name):
     assert sorted(os.listdir(tmp_path)) == ["folder", "plain"]
 
 
+@pytest.mark.parametrize("path", ["", ".", os.sep])
+def test_a_path_without_a_name_is_refused(path, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(VADError, match="is a folder; give the path of a file"), atomic_path(path):
+        pass
+    assert not os.listdir(tmp_path)
+
+
 def test_writable_folder_makes_parents_and_leaves_no_trace(tmp_path):
     assert os.listdir(writable_folder(tmp_path / "a" / "b")) == []
     assert os.listdir(writable_folder(tmp_path / "a" / "b")) == []

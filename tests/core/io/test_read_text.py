@@ -112,7 +112,7 @@ def test_named_columns_are_carried(folder, name, text, expected):
 
 
 def test_colours_that_are_no_bytes_stay_what_they_are(folder):
-    for red in (0.5, 256, -1, float("nan")):
+    for red in (0.5, 256, -1, float("nan"), float("inf")):
         carried = read_scan(written(folder, "scan.csv", f"x,y,z,r,g,b\n1,2,3,{red},0,1\n"))[1]
         assert all(carried[name].dtype == np.float64 for name in ("red", "green", "blue"))
         np.testing.assert_array_equal(carried["red"], [red])
