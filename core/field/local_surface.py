@@ -23,7 +23,7 @@ from .rims.rim_lines import with_rim_lines
 from .rims.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
 
 _AROUND = 32  # samples, whose median spacing is that of a place
-_SMALLEST, _LARGEST = 1e-15, 1e15  # span of the points
+_SMALLEST, _LARGEST = 1e-7, 1e10  # span of the points
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,12 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     """Patches and rims of distinct samples (n,3) with axes (n,3) of any length, their confidence (n,) in [0,1] and
     local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Raises :class:`InputError` for
     other shapes, what is not finite, axes without a direction, spacings not above 0, and points that span more or less
-    than single precision holds the squares of."""
+    than single precision holds the fourth powers of."""
     progress, points = Progress.of(progress), finite_points(points, least=2)
     span = float(np.ptp(points, axis=0).max())
     if not _SMALLEST < span < _LARGEST:
         raise InputError(
-            f"the points span {span:g}; squares of distances in single precision need a span from {_SMALLEST:g} to "
+            f"the points span {span:g}; powers of distances in single precision need a span from {_SMALLEST:g} to "
             f"{_LARGEST:g}, so scale them to an ordinary size"
         )
     normals, confidence = known_normals((normals, confidence), len(points), slice(None))

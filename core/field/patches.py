@@ -89,8 +89,10 @@ def _past_edges(lateral, ends, margin):
     """
     found = []
     for end, last in zip(ends, margin[1:], strict=True):
-        along, length = dots(lateral, end), np.sqrt(np.maximum(dots(end, end), _TINY))
-        away = np.sqrt(np.maximum(dots(lateral, lateral) - (along / length) ** 2, 0))
+        squared = np.maximum(dots(end, end), _TINY)
+        along = dots(lateral, end)
+        length = np.sqrt(squared)
+        away = np.sqrt(np.maximum(dots(lateral, lateral) - along**2 / squared, 0))
         taper = np.clip((last - margin[0]) / length, -_STEEPEST, _STEEPEST)
         share = np.clip((along / length + away * taper / np.sqrt(1 - taper**2)) / length, 0, 1)
         step = lateral - share * end

@@ -97,7 +97,7 @@ def test_stages_alone_refuse_what_a_run_refuses():
         with pytest.raises(InputError, match=message):
             fit_local_surface(points, normals, confidence, spacing, 3.0)
     for size in (1e-20, 1e20):
-        with pytest.raises(InputError, match=r"the points span .* from 1e-15 to 1e\+15"):
+        with pytest.raises(InputError, match=r"the points span .* from 1e-07 to 1e\+10"):
             fit_local_surface(size * points, points, np.ones(300), size * spacing, 3.0)
     surface = fit_local_surface(points.tolist(), points.tolist(), [1] * 300, spacing, 3.0)
     for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
@@ -120,7 +120,7 @@ def test_axes_given_to_the_stage_of_normals_may_have_any_length(solver):
 
 @pytest.mark.parametrize(
     ("scale", "centre"),
-    [(1e9, (0, 0, 0)), (1e-9, (0, 0, 0)), (1, (4e5, 5e6, 100)), (1e3, (-1e9, 0, 1e8))],
+    [(1e9, (0, 0, 0)), (1e-6, (0, 0, 0)), (1, (4e5, 5e6, 100)), (1e3, (-1e9, 0, 1e8))],
     ids=["nanometres", "tiny", "map coordinates", "far off"],
 )
 def test_stages_follow_scale_and_place(scale, centre):
@@ -148,7 +148,7 @@ def test_stages_follow_scale_and_place(scale, centre):
 
 
 @pytest.mark.parametrize("shape", [shapes.disc(300), shapes.junction(400)], ids=["disc", "junction"])
-@pytest.mark.parametrize("scale", [1e-12, 1e3, 1e9, 1e12])
+@pytest.mark.parametrize("scale", [1e-6, 1e3, 1e9])
 def test_meshes_of_open_shapes_follow_the_scale(shape, scale):
     """None of what is divided by lengths that may be zero passes what numbers can hold."""
 
