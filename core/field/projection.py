@@ -219,9 +219,10 @@ def sheet_foot(near: Nearby, anchor) -> SheetFoot:
     between = near.offset[:, every, anchor][:, :, None] - near.offset
     member = membership(between, *_off_patches(near, anchor, between), near.room[every, anchor, None])
     weight = near.kernel * member
-    alone = np.flatnonzero(~weight.any(axis=1))  # so far off, in spacings, that no kernel of the sheet is above zero
-    weight[alone, anchor[alone]] = 1
-    weight /= np.einsum("mk->m", weight)[:, None]
+    total = np.einsum("mk->m", weight)
+    alone = np.flatnonzero(total == 0)  # so far off, in spacings, that no kernel of the sheet is above zero
+    weight[alone, anchor[alone]] = total[alone] = 1
+    weight /= total[:, None]
     axis = fused_axes(weight, near.pull, near.normals)
     cosine = dots(near.normals, axis.T.astype(np.float32)[:, :, None])
     towards = weight * cosine
