@@ -59,6 +59,17 @@ class Mesh:
         faces = np.concatenate([*halves, faces[2 * pairs[0] :], others[2 * pairs[1] :]])
         return Mesh(np.concatenate([self.vertices, other.vertices]), faces, sum(pairs))
 
+    def with_part(self, near: np.ndarray, row: np.ndarray, part: "Mesh") -> "Mesh":
+        """The mesh with the faces of `part` in place of those marked in `near`, (f,) bool; vertices of the part, first
+        of all, are the rows `row` of this mesh's, all of which those faces have."""
+        vertices, outside = self.vertices.copy(), self.of_faces(~near)
+        vertices[row] = part.vertices
+        part = replace(part, faces=row[part.faces])
+        kinds = (np.split(each.faces, [each.pairs, 2 * each.pairs]) for each in (outside, part))
+        faces = np.concatenate([each for both in zip(*kinds, strict=True) for each in both])
+        vertices, faces = in_use(vertices, faces)
+        return Mesh(vertices, faces.astype(np.int32), outside.pairs + part.pairs)
+
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
         ends, count = edges_of(self.faces, len(self.vertices))

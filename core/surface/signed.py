@@ -13,13 +13,13 @@ from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
 from .mesh import Mesh
-from .meshing.centring import centred
 from .meshing.evening import evened
+from .meshing.finishing import finished
 from .meshing.pieces import pieces_with_samples
 from .meshing.triangles import mesh_of
 from .signs.sides import Sides
 from .signs.thin_parts import find_thin_parts
-from .signs.zero_set import sharpened, zero_set
+from .signs.zero_set import zero_set
 from .single.settling import settled
 
 _CLAMP = 3.0  # cells; farther values do not matter for the mesh
@@ -57,7 +57,7 @@ def signed_mesh(values, passing: np.ndarray, surface: LocalSurface, grid: Grid, 
     on = found.distance <= grid.spacing
     vertices[on] = settled(vertices[on], found.step[on], surface, grid.spacing, progress.part(0.7, 0.8))
     mesh = mesh_of(vertices, faces)
-    mesh = centred(sharpened(mesh, passing, surface, grid.spacing, progress.part(0.8, 0.9)))
+    mesh = finished(mesh, passing, surface, grid.spacing, progress.part(0.8, 0.9))
     progress(0.92)
     _relax(mesh, np.flatnonzero(~on))
     progress(0.96)

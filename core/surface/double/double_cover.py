@@ -19,6 +19,7 @@ from ..meshing.isosurface import isosurface
 from ..meshing.pieces import pieces_with_samples
 from ..meshing.slivers import without_slivers
 from ..meshing.triangles import mesh_of
+from ..meshing.unfolding import unfolded
 from .layers import laid_apart
 from .leaks import lower_around, shut_leaks
 from .pinholes import find_pinholes
@@ -99,7 +100,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
     loose |= stretched_vertices(vertices, faces, surface, grid.spacing)
     vertices = spanned(vertices, faces, loose)
-    mesh = without_slivers(mesh_of(vertices, faces), grid.spacing)
+    mesh = unfolded(without_slivers(mesh_of(vertices, faces), grid.spacing), surface, grid.spacing)
     progress(0.8)
     dense = surface.spacing_in_cells(grid) < DENSE
     mesh = centred(mesh) if dense else laid_apart(mesh, grid.spacing, progress.part(0.8, 0.9))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...linalg import cross, dots, lengths, symmetric
-from ..mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, in_use, looked_up
+from ..mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
 
 _SHORT = 0.3  # cells, edges whose ends become one
 _FLAT = 0.15  # height of triangles over their longest side, below which this is turned
@@ -30,20 +30,14 @@ def without_slivers(mesh: Mesh, cell: float) -> Mesh:
     near = _around_slivers(mesh, cell)
     if not near.any():
         return mesh
-    row, outside = np.unique(mesh.faces[near]), mesh.of_faces(~near)
-    free, chance = ~np.isin(row, outside.faces), np.random.default_rng(0)
+    row, chance = np.unique(mesh.faces[near]), np.random.default_rng(0)
+    free = ~np.isin(row, mesh.faces[~near])
     part = mesh.part(near)
     for shortest in np.linspace(0, _SHORT * cell, _ROUNDS + 1)[1:]:
         for _ in range(_TIMES):
             part = _with_ends_joined(part, free, shortest, cell, chance)
         part = _with_sides_turned(part, free, cell)
-    vertices = mesh.vertices.copy()
-    vertices[row] = part.vertices
-    part = replace(part, faces=row[part.faces])
-    kinds = (np.split(each.faces, [each.pairs, 2 * each.pairs]) for each in (outside, part))
-    faces = np.concatenate([faces for both in zip(*kinds, strict=True) for faces in both])
-    vertices, faces = in_use(vertices, faces)
-    return Mesh(vertices, faces.astype(np.int32), outside.pairs + part.pairs)
+    return mesh.with_part(near, row, part)
 
 
 def _around_slivers(mesh, cell):

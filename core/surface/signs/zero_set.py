@@ -1,22 +1,14 @@
-"""Where signed distances are zero, as vertices and faces, and creases of meshes that lie there."""
-
-from dataclasses import replace
+"""Where signed distances are zero, as vertices and faces."""
 
 import numpy as np
 
 from ...field.blocks import Blocks, at_nodes
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
-from ...linalg import row_dots
 from ...progress import Progress
-from ..mesh import Mesh, in_use
-from ..meshing.corners import into_corners
-from ..meshing.evening import FLAT, vertex_normals
+from ..mesh import in_use
 from ..meshing.isosurface import isosurface
 from .thin_parts import ThinParts
-
-_ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
-_INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, and to a line where sheets pass through
 
 
 def zero_set(
@@ -42,37 +34,3 @@ def zero_set(
         lifted = np.flatnonzero(thin.lift(vertices))
         vertices[lifted] -= surface.project(vertices[lifted], progress).step
     return vertices, faces
-
-
-def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
-    """The mesh, whose vertices lie on the surface, with those next to creases taken into them: inward ones, then
-    outward ones, which are inward seen from inside. Wedges along lines where sheets pass through one another are
-    outward creases; they start far from their edge, and are looked at once more.
-
-    passing : (n,) bool, the samples close to such lines
-    """
-    vertices = mesh.vertices
-    turns = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
-    farthest = _farthest(vertices, passing, surface)
-    for turn, outward in enumerate(turns):
-        part = progress.part(turn / len(turns), (turn + 1) / len(turns))
-        normal, least = vertex_normals(vertices, mesh.faces)
-        beside_bends, side = np.zeros(len(vertices), bool), np.zeros_like(vertices)
-        beside_bends[mesh.faces[(least < FLAT)[mesh.faces].any(axis=1)]] = True
-        row = np.flatnonzero(beside_bends)
-        way = outward * normal[row]
-        found = surface.project(vertices[row] + _ASIDE * cell * way, part.part(0.0, 0.5))
-        direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell
-        clear = back & (row_dots(direction, way) > 0) & ~found.past_rim
-        side[row[clear]] = direction[clear]
-        known = side.any(axis=1)
-        beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
-        vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), farthest)
-    return replace(mesh, vertices=vertices)
-
-
-def _farthest(vertices, passing, surface):
-    """How many cells each vertex may go into a crease, (v,), or where no sheets pass through one another, all."""
-    if not passing.any():
-        return _INTO
-    return np.where(passing[surface.tree.query(vertices, workers=-1)[1]], _INTO_LINES, _INTO)

@@ -16,13 +16,12 @@ from ..double.double_cover import double_cover
 from ..edges.crossings import Crossings
 from ..edges.meetings import Meetings
 from ..mesh import Mesh
-from ..meshing.centring import centred
+from ..meshing.finishing import finished
 from ..meshing.misfit import chamfer, misfit
 from ..signed import signed_mesh
 from ..signs.patches import patch_lengths, patches
 from ..signs.sides import Sides
 from ..signs.two_sides import LONG, two_sided
-from ..signs.zero_set import sharpened
 from .dual_contour import dual_contour
 from .holes import fill_pinholes
 from .junctions import onto_junctions
@@ -216,7 +215,7 @@ def _finished(mesh, passing, surface, grid, progress):
     wound alike."""
     sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
     sheet = onto_junctions(sheet, surface, grid.spacing, progress.part(0.0, 0.5))
-    return centred(sharpened(sheet, passing, surface, grid.spacing, progress.part(0.5, 1.0))), unoriented
+    return finished(sheet, passing, surface, grid.spacing, progress.part(0.5, 1.0)), unoriented
 
 
 def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:

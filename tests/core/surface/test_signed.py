@@ -12,8 +12,8 @@ from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.progress import Progress
 from core.surface.meshing.corners import into_corners
+from core.surface.meshing.finishing import sharpened
 from core.surface.signed import signed_mesh
-from core.surface.signs.zero_set import sharpened
 from tests import shapes
 
 
@@ -203,7 +203,7 @@ def test_creases_are_sharpened_by_the_faces_beside_them(monkeypatch):
         seen.append(len(faces))
         return into_corners(vertices, blunt.faces, *rest)
 
-    monkeypatch.setattr("core.surface.signs.zero_set.into_corners", by_all)
+    monkeypatch.setattr("core.surface.meshing.finishing.into_corners", by_all)
     expected = sharpened(blunt, np.zeros(len(points), bool), surface, grid.spacing, Progress())
     assert 0 < max(seen) < 0.5 * len(blunt.faces)
     assert np.linalg.norm(found.vertices - blunt.vertices, axis=1).max() > 0.1 * grid.spacing

@@ -376,7 +376,7 @@ def test_in_doubt_the_cover_that_is_closer_to_the_surface_is_taken(monkeypatch, 
     for sign in (1, -1):
         monkeypatch.setattr(choice, "chamfer", lambda *given, sign=sign: sign * misfit.chamfer(*given))
         cover = reconstruct(points, Settings(resolution=40)).surface
-        off.append(exact_distances(on_faces(cover, 4000), truth).mean() + exact_distances(points, cover).mean())
+        off.append(exact_distances(on_faces(cover, 40_000), truth).mean() + exact_distances(points, cover).mean())
     assert off[0] < 0.8 * off[1]
 
 

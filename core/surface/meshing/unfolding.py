@@ -1,0 +1,179 @@
+"""Faces that lie back to front on their neighbours, where vertices of a mesh went past one another."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.spatial import KDTree
+
+from ...field.local_surface import LocalSurface
+from ...linalg import cross, dots, lengths
+from ...parts import connected_parts
+from ..mesh import Mesh, at_corners, edge_numbers, edges_of, faces_across
+from .evening import vertex_normals
+
+_FOLD = -0.5  # cosine between the normals of two faces, below which there is a fold between them
+_BENT = 0.5  # least cosine between the normals of a vertex and of its faces; at a fold one has less
+_FEW = 16  # faces between folds; where there are more, the surface bends so
+_BARE, _BARER = 0.5, 0.25  # cells, that samples may be off the mesh around moved vertices, and further than before
+_FLAT = 1e-6  # height of a face over its longest side, below which it has no normal, and counts as folded
+_AROUND = 4  # rings of faces around folds that are looked at
+_RINGS = 3  # of vertices that are moved, one after the other
+_STEPS, _DAMPING = 10, 0.5
+_BRANCH = 2  # vertices of lines to either side of where these branch, that stay
+_ON = 0.5  # cells, from the surface, where vertices are taken to it
+
+
+def unfolded(mesh: Mesh, surface: LocalSurface, cell: float, held: np.ndarray | bool = False) -> Mesh:
+    """The mesh without small patches between folds, whose faces lie on their neighbours: at borders they go, elsewhere
+    the vertices around are moved towards the middle of their neighbours (Laplacian smoothing) and onto the surface.
+
+    held : (v,) bool, vertices that move only if others are not enough, those taken into creases for instance
+
+    Vertices at borders stay, and so do those where the surface itself folds, as layers do at a rim, where lines of more
+    than two faces end, and next to where these branch; others of lines move along them. Around those that would leave
+    samples bare, as at the tips of thin parts, all is left as it was.
+    """
+    near = _beside_folds(mesh)
+    near[near] = _folded(*_cut_out(mesh, near)[1:])[0]
+    if not near.any():
+        return mesh
+    near = _with_halves(mesh, _at(mesh, _grown(mesh, near, _AROUND)))
+    row, part, cut = _cut_out(mesh, near)
+    for stays in (cut | np.broadcast_to(held, len(mesh.vertices))[row], cut):
+        for rings in range(_RINGS):
+            folded, rim = _folded(part, cut)
+            flaps = _flaps(part, folded, cut)
+            if flaps.any():
+                part = part.of_faces(~flaps)
+                folded, rim = _folded(part, cut)
+            if not folded.any():
+                break
+            part = _relaxed(part, _grown(part, folded, rings) & ~(stays | rim), surface, cell)
+    return mesh.with_part(near, row, _where_it_covers(part, mesh.vertices[row], surface, cell))
+
+
+def _where_it_covers(mesh, before, surface, cell):
+    """The mesh with vertices as they were `before`, (v,3), where samples come to lie off it: as tips and thin plates do
+    that get blunt."""
+    moved = (mesh.vertices != before).any(axis=1)
+    (low, high), _ = edges_of(mesh.faces, len(before))
+    inside = moved[low] & moved[high]
+    group = connected_parts(low[inside], high[inside], len(before))
+    vertex = np.flatnonzero(moved)
+    around = surface.around(before[vertex])
+    sample, first = np.unique(around, return_index=True)
+    group_of = group[vertex[first // around.shape[1]]]
+    was, now = (_distance(surface.points[sample], x, mesh.faces) for x in (before, mesh.vertices))
+    bare = now > np.maximum(was + _BARER * cell, _BARE * cell)
+    back = np.isin(group, group_of[bare])
+    return replace(mesh, vertices=np.where(back[:, None], before, mesh.vertices))
+
+
+def _distance(points, vertices, faces):
+    """Distance (m,) from points (m,3) to the nearest corner, middle of a side, or centroid of faces."""
+    corners = vertices[faces]
+    places = [corners[:, 0], corners.mean(axis=1), *(0.5 * (corners[:, k] + corners[:, k - 1]) for k in range(3))]
+    return KDTree(np.concatenate([vertices[np.unique(faces)], *places[1:]])).query(points)[0]
+
+
+def _beside_folds(mesh):
+    """Which faces have a vertex next to a fold, or are half of a quad that has, (f,) bool."""
+    return _with_halves(mesh, _at(mesh, vertex_normals(mesh.vertices, mesh.faces)[1] < _BENT))
+
+
+def _cut_out(mesh, near):
+    """The vertices (p,) of the faces `near`, (f,) bool, the mesh of these, and which of its vertices others have, too,
+    (p,) bool."""
+    row = np.unique(mesh.faces[near])
+    beyond = np.zeros(len(mesh.vertices), bool)
+    beyond[mesh.faces[~near]] = True
+    return row, mesh.part(near), beyond[row]
+
+
+def _with_halves(mesh, chosen):
+    """The faces `chosen`, (f,) bool, with the other halves of their quads."""
+    found, halves = chosen.copy(), chosen[: 2 * mesh.pairs].reshape(2, -1)
+    found[: 2 * mesh.pairs] = np.tile(halves[0] | halves[1], 2)
+    return found
+
+
+def _at(mesh, chosen):
+    """Which faces have a vertex that is `chosen`, (v,) bool, (f,) bool."""
+    first, second, third = (chosen[corner] for corner in mesh.faces.T)
+    return first | second | third
+
+
+def _grown(mesh, chosen, rings):
+    """The vertices of the faces `chosen`, (f,) bool, and of so many rings of faces around them, (v,) bool."""
+    found = np.zeros(len(mesh.vertices), bool)
+    found[mesh.faces[chosen]] = True
+    for _ in range(rings):
+        found[mesh.faces[_at(mesh, found)]] = True
+    return found
+
+
+def _folded(mesh, cut):
+    """Which faces are few between folds, (f,) bool: connected to no more across edges that are no folds, nor to what is
+    `cut` off, (v,) bool; and which vertices are on folds between many faces, (v,) bool."""
+    faces, (a, b, c) = mesh.faces, at_corners(mesh.vertices, mesh.faces)
+    normal, edges = cross(b - a, c - a), (b - a, c - b, a - c)
+    double = lengths(normal)
+    normal /= np.maximum(double, np.finfo(float).tiny)
+    flat = double <= _FLAT * np.max([dots(edge, edge) for edge in edges], axis=0)
+    edge, count = edge_numbers(faces, len(mesh.vertices))
+    one, other = faces_across(edge, count)
+    forward = faces < np.roll(faces, -1, axis=1)
+    alike = np.bincount(edge.reshape(-1), forward.reshape(-1))[count == 2] == 1
+    cosine = dots(*(normal.take(face, axis=1) for face in (one, other))) * np.where(alike, 1, -1)
+    fold = (cosine < _FOLD) | flat[one] | flat[other]
+    patch = connected_parts(one[~fold], other[~fold], len(faces))
+    (low, high), _ = edges_of(faces, len(mesh.vertices))
+    goes_on = ((count == 1) & cut[low] & cut[high])[edge].any(axis=1)
+    few = (np.bincount(patch)[patch] <= _FEW) & ~np.isin(patch, patch[goes_on])
+    beside = np.isin(patch, patch[np.append(one[fold], other[fold])])
+    at = np.flatnonzero(count == 2)[fold & ~few[one] & ~few[other]]
+    rim = np.zeros(len(mesh.vertices), bool)
+    rim[low[at]] = rim[high[at]] = True
+    return few & beside, rim
+
+
+def _flaps(mesh, folded, cut):
+    """The faces that are `folded`, (f,) bool, at a border that stays a simple curve without them, (f,) bool, no two of
+    them with the corner across it in common; what is `cut` off, (v,) bool, is no border."""
+    flaps, (edge, count) = np.zeros(len(folded), bool), edge_numbers(mesh.faces, len(mesh.vertices))
+    (low, high), _ = edges_of(mesh.faces, len(mesh.vertices))
+    manifold = np.ones(len(mesh.vertices), bool)
+    for end in (low, high):
+        manifold[end[count != 2]] = False
+    border = (count == 1) & ~(cut[low] & cut[high])
+    row = np.flatnonzero(folded & border[edge].any(axis=1) & (count[edge] <= 2).all(axis=1))
+    at = border[edge[row]]
+    across = np.take_along_axis(mesh.faces[row], (at.argmax(axis=1)[:, None] + 2) % 3, axis=1)[:, 0]
+    simple = (at.sum(axis=1) == 2) | ((at.sum(axis=1) == 1) & manifold[across])
+    flaps[row[simple][np.unique(across[simple], return_index=True)[1]]] = True
+    return flaps
+
+
+def _relaxed(mesh, chosen, surface, cell):
+    """The mesh with the vertices `chosen`, (v,) bool, that may move among their neighbours."""
+    n, vertices = len(mesh.vertices), mesh.vertices.copy()
+    (low, high), count = edges_of(mesh.faces, n)
+    on_line, on_border = (np.bincount(np.append(low[e], high[e]), minlength=n) for e in (count > 2, count == 1))
+    tail, head, line = np.append(low, high), np.append(high, low), np.tile(count > 2, 2)
+    stays = on_line > 2
+    for _ in range(_BRANCH):
+        stays[tail[line & stays[head]]] = True
+    stays |= (on_border > 0) | (on_line == 1)
+    row = np.flatnonzero(chosen & ~stays)
+    if not len(row):
+        return mesh
+    link = line | (on_line[tail] == 0)
+    links = coo_matrix((np.ones(link.sum()), (tail[link], head[link])), shape=(n, n)).tocsr()[row]
+    degree = np.diff(links.indptr)[:, None]
+    for _ in range(_STEPS):
+        vertices[row] += _DAMPING * (links @ vertices / degree - vertices[row])
+    found = surface.project(vertices[row])
+    on = found.distance <= _ON * cell
+    vertices[row[on]] -= found.step[on]
+    return replace(mesh, vertices=vertices)
