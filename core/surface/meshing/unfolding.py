@@ -140,26 +140,32 @@ def _folded(mesh, cut):
 
 def _flaps(mesh, folded, cut):
     """The faces that are `folded`, (f,) bool, at a border that stays a simple curve without them, (f,) bool, no two of
-    them with the corner across it in common; what is `cut` off, (v,) bool, is no border."""
+    them with the corner across it in common; what is `cut` off, (v,) bool, is no border. None at a line of more than
+    two faces, unless this is no more than an edge of three."""
     flaps, (edge, count) = np.zeros(len(folded), bool), edge_numbers(mesh.faces, len(mesh.vertices))
     (low, high), _ = edges_of(mesh.faces, len(mesh.vertices))
-    manifold = np.ones(len(mesh.vertices), bool)
-    for end in (low, high):
-        manifold[end[count != 2]] = False
+    on_line, on_border = (_ends_at(low, high, kind, len(mesh.vertices)) for kind in (count > 2, count == 1))
     border = (count == 1) & ~(cut[low] & cut[high])
-    row = np.flatnonzero(folded & border[edge].any(axis=1) & (count[edge] <= 2).all(axis=1))
+    lone = (count == 3) & (on_line[low] == 1) & (on_line[high] == 1)
+    row = np.flatnonzero(folded & border[edge].any(axis=1) & ((count <= 2) | lone)[edge].all(axis=1))
     at = border[edge[row]]
     across = np.take_along_axis(mesh.faces[row], (at.argmax(axis=1)[:, None] + 2) % 3, axis=1)[:, 0]
-    simple = (at.sum(axis=1) == 2) | ((at.sum(axis=1) == 1) & manifold[across])
+    inside = (on_line[across] == 0) & (on_border[across] == 0)
+    simple = (at.sum(axis=1) == 2) | ((at.sum(axis=1) == 1) & (inside | lone[edge[row]].any(axis=1)))
     flaps[row[simple][np.unique(across[simple], return_index=True)[1]]] = True
     return flaps
+
+
+def _ends_at(low, high, chosen, n):
+    """How many edges of those `chosen`, (e,) bool, each vertex has, (n,) int."""
+    return np.bincount(np.append(low[chosen], high[chosen]), minlength=n)
 
 
 def _relaxed(mesh, chosen, surface, cell):
     """The mesh with the vertices `chosen`, (v,) bool, that may move among their neighbours."""
     n, vertices = len(mesh.vertices), mesh.vertices.copy()
     (low, high), count = edges_of(mesh.faces, n)
-    on_line, on_border = (np.bincount(np.append(low[e], high[e]), minlength=n) for e in (count > 2, count == 1))
+    on_line, on_border = (_ends_at(low, high, kind, n) for kind in (count > 2, count == 1))
     tail, head, line = np.append(low, high), np.append(high, low), np.tile(count > 2, 2)
     stays = on_line > 2
     for _ in range(_BRANCH):

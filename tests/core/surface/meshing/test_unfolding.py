@@ -67,17 +67,21 @@ def test_a_vertex_that_is_held_stays_and_others_make_room(plane):
     assert np.linalg.norm(found.vertices - [7.3, 6.2, 0], axis=1).min() == 0
 
 
-def test_a_face_at_a_border_that_lies_on_others_goes(plane):
+@pytest.mark.parametrize("to_inside", [False, True])
+def test_faces_at_a_border_that_lie_on_others_go(plane, to_inside):
+    """Over the border from (0,0) to (1,0), back over the square, and on to an edge inside, which then has three."""
     mesh = square()
-    flap = np.array([[SIDE + 1, 0, len(mesh.vertices)]])  # over the border from (0,0) to (1,0), back over the square
-    mesh = Mesh(
-        np.vstack([mesh.vertices, [0.5, 0.4, 0.0]]), np.concatenate([mesh.faces, flap]).astype(np.int32), mesh.pairs
-    )
-    assert (areas_from_above(mesh) < 0).sum() == 1
-    found = unfolded(mesh, plane, 1.0)
+    start, end, inside, tip = 0, SIDE + 1, SIDE + 2, len(mesh.vertices)
+    flap = np.array([[end, start, tip], [tip, inside, end]])[: 1 + to_inside]
+    faces = np.concatenate([mesh.faces, flap]).astype(np.int32)
+    spoiled = Mesh(np.vstack([mesh.vertices, [0.5, 0.4, 0.0]]), faces, mesh.pairs)
+    assert (spoiled.edge_counts()[1] == 3).sum() == to_inside
+    assert (areas_from_above(spoiled) < 0).any()
+    found = unfolded(spoiled, plane, 1.0)
     assert (areas_from_above(found) > 0).all()
-    assert len(found.faces) == len(mesh.faces) - 1
+    assert len(found.faces) == len(mesh.faces)
     assert found.border_loops() == 1
+    assert set(found.edge_counts()[1]) == {1, 2}
     assert found.pairs == mesh.pairs
 
 
