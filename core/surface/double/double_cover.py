@@ -75,7 +75,8 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
 
     Where OpenVDB is found most of its triangles are the halves of quads: the iso-surface is a dual one (Nielson, IEEE
     Visualization 2004), with a vertex for each patch of it in a cell and a quad around each grid edge it crosses; it is
-    flattened against rims, which leaves slivers that are taken out, see :mod:`..meshing.slivers`.
+    flattened against rims, which leaves slivers that are taken out, see :mod:`..meshing.slivers`, and a few faces that
+    lie back to front, see :mod:`..meshing.unfolding`.
 
     Raises :class:`SettingsError` for an offset that the box has no room for, and :class:`MissingDependency` where no
     library that extracts iso-surfaces is found.
