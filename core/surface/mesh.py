@@ -1,6 +1,7 @@
 """Triangle meshes as plain arrays, some of whose triangles may be the halves of quads."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -34,6 +35,11 @@ class Mesh:
     def triangles(self) -> np.ndarray:
         """The faces that are no half of a quad, (f - 2 pairs,3)."""
         return self.faces[2 * self.pairs :]
+
+    @cached_property
+    def normals(self) -> tuple[np.ndarray, np.ndarray]:
+        """What :func:`vertex_normals` gives."""
+        return vertex_normals(self.vertices, self.faces)
 
     def of_faces(self, kept: np.ndarray, paired: np.ndarray | None = None) -> "Mesh":
         """The mesh of the faces marked in `kept`, (f,) bool, in the same order. A quad stays one where both its halves
@@ -151,3 +157,28 @@ def looked_up(table: csr_matrix, tail: np.ndarray, head: np.ndarray) -> np.ndarr
     if not len(low):  # of nothing SciPy gives another sparse array
         return np.zeros(tail.shape, table.dtype)
     return np.asarray(table[low, high]).reshape(tail.shape)
+
+
+def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals (v,3) of the vertices, by area, and the least cosine between each and those of its faces, (v,)."""
+    n, corners, columns = len(vertices), faces.T.astype(np.intp), np.asfortranarray(vertices)
+    start, end = (0, 1), (2, 3 % len(corners))  # of the diagonals of a quad, of two sides of a triangle
+    face, cosine = np.empty((3, len(faces))), np.empty(corners.shape)
+
+    def turn(part):
+        places = at_corners(columns, faces[part])
+        face[:, part] = cross(*(places[b] - places[a] for a, b in zip(start, end, strict=True)))
+
+    def compare(part):
+        unit = face[:, part] / np.maximum(lengths(face[:, part]), np.finfo(float).tiny)
+        for corner, found in zip(corners, cosine, strict=True):
+            found[part] = np.einsum("if,if->f", unit, normal.take(corner[part], axis=1))
+
+    over_rows(turn, len(faces), AT_ONCE)
+    normal = np.stack([sum(np.bincount(corner, x, n) for corner in corners) for x in face])
+    normal = normal / np.maximum(lengths(normal), np.finfo(float).tiny)
+    over_rows(compare, len(faces), AT_ONCE)
+    least = np.ones(n)
+    for corner, found in zip(corners, cosine, strict=True):
+        np.minimum.at(least, corner, found)
+    return normal.T.copy(), least

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...parallel import in_order, over_rows
 from ..mesh import AT_ONCE, Mesh, at_corners
-from .evening import FLAT, vertex_normals
+from .evening import FLAT
 
 _SHARE = 2 / 3  # of what faces are off at their centroids
 
@@ -64,7 +64,7 @@ class Bend:
 def bend_of(mesh: Mesh) -> Bend:
     """How the surface bends under the faces of a mesh whose vertices lie on it."""
     vertices, faces = mesh.vertices, mesh.faces
-    (normal, least), (edges, counts) = _both(partial(vertex_normals, vertices, faces), mesh.edge_counts)
+    (normal, least), (edges, counts) = _both(lambda: mesh.normals, mesh.edge_counts)
     sharp = least < FLAT
     free = ~sharp
     free[edges[counts != 2]] = False

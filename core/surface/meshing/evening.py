@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from ...linalg import cross, lengths, row_dots, symmetric
-from ...parallel import over_rows
-from ..mesh import AT_ONCE, at_corners, edges_of
+from ...linalg import row_dots, symmetric
+from ..mesh import edges_of, vertex_normals
 
 _ROUNDS, _DAMPING = 5, 0.5
 FLAT = 0.9  # least cosine between the normals of a vertex and of each face around it, where it may move
@@ -35,28 +34,3 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
         here += step
         moved[free] = here
     return moved
-
-
-def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals (v,3) of the vertices, by area, and the least cosine between each and those of its faces, (v,)."""
-    n, corners, columns = len(vertices), faces.T.astype(np.intp), np.asfortranarray(vertices)
-    start, end = (0, 1), (2, 3 % len(corners))  # of the diagonals of a quad, of two sides of a triangle
-    face, cosine = np.empty((3, len(faces))), np.empty(corners.shape)
-
-    def turn(part):
-        places = at_corners(columns, faces[part])
-        face[:, part] = cross(*(places[b] - places[a] for a, b in zip(start, end, strict=True)))
-
-    def compare(part):
-        unit = face[:, part] / np.maximum(lengths(face[:, part]), np.finfo(float).tiny)
-        for corner, found in zip(corners, cosine, strict=True):
-            found[part] = np.einsum("if,if->f", unit, normal.take(corner[part], axis=1))
-
-    over_rows(turn, len(faces), AT_ONCE)
-    normal = np.stack([sum(np.bincount(corner, x, n) for corner in corners) for x in face])
-    normal = normal / np.maximum(lengths(normal), np.finfo(float).tiny)
-    over_rows(compare, len(faces), AT_ONCE)
-    least = np.ones(n)
-    for corner, found in zip(corners, cosine, strict=True):
-        np.minimum.at(least, corner, found)
-    return normal.T.copy(), least

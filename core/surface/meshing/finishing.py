@@ -10,7 +10,7 @@ from ...progress import Progress
 from ..mesh import Mesh
 from .centring import centred
 from .corners import into_corners
-from .evening import FLAT, vertex_normals
+from .evening import FLAT
 from .unfolding import unfolded
 
 _ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
@@ -31,12 +31,11 @@ def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: floa
 
     passing : (n,) bool, the samples close to such lines
     """
-    vertices = mesh.vertices
     turns = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
-    farthest = _farthest(vertices, passing, surface)
+    farthest = _farthest(mesh.vertices, passing, surface)
     for turn, outward in enumerate(turns):
         part = progress.part(turn / len(turns), (turn + 1) / len(turns))
-        normal, least = vertex_normals(vertices, mesh.faces)
+        vertices, (normal, least) = mesh.vertices, mesh.normals
         beside_bends, side = np.zeros(len(vertices), bool), np.zeros_like(vertices)
         beside_bends[mesh.faces[(least < FLAT)[mesh.faces].any(axis=1)]] = True
         row = np.flatnonzero(beside_bends)
@@ -47,8 +46,10 @@ def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: floa
         side[row[clear]] = direction[clear]
         known = side.any(axis=1)
         beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
-        vertices = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), farthest)
-    return replace(mesh, vertices=vertices)
+        moved = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), farthest)
+        if (moved != vertices).any():
+            mesh = replace(mesh, vertices=moved)
+    return mesh
 
 
 def _farthest(vertices, passing, surface):

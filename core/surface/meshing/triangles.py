@@ -3,8 +3,8 @@
 import numpy as np
 
 from ...parallel import over_rows
-from ..mesh import AT_ONCE, Mesh, at_corners, edge_table, looked_up
-from .evening import FLAT, vertex_normals
+from ..mesh import AT_ONCE, Mesh, at_corners, edge_table, looked_up, vertex_normals
+from .evening import FLAT
 from .fillings import edge_keys
 
 _EVEN = 1.5  # times the other's squared length, that a diagonal may have

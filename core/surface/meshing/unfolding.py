@@ -10,7 +10,6 @@ from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, lengths
 from ...parts import connected_parts
 from ..mesh import Mesh, at_corners, edge_numbers, edges_of, faces_across
-from .evening import vertex_normals
 
 _FOLD = -0.5  # cosine between the normals of two faces, below which there is a fold between them
 _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; at a fold one has less
@@ -79,7 +78,7 @@ def _distance(points, vertices, faces):
 
 def _beside_folds(mesh):
     """Which faces have a vertex next to a fold, or are half of a quad that has, (f,) bool."""
-    return _with_halves(mesh, _at(mesh, vertex_normals(mesh.vertices, mesh.faces)[1] < _BENT))
+    return _with_halves(mesh, _at(mesh, mesh.normals[1] < _BENT))
 
 
 def _cut_out(mesh, near):
