@@ -82,8 +82,8 @@ def _beside_folds(mesh):
 
 
 def _cut_out(mesh, near):
-    """The vertices (p,) of the faces `near`, (f,) bool, the mesh of these, and which of its vertices others have, too,
-    (p,) bool."""
+    """The vertices (p,) of the faces `near`, (f,) bool, the mesh of these, in the same order where quads are whole, and
+    which of its vertices others have, too, (p,) bool."""
     row = np.unique(mesh.faces[near])
     beyond = np.zeros(len(mesh.vertices), bool)
     beyond[mesh.faces[~near]] = True
