@@ -24,7 +24,7 @@ _BAND = 4.0  # cells, the band that is advised at least
 # times as much, nine tenths of them .8 to 1.4: the Voronoi diagram by samples, the field by nodes, the meshes by nodes
 # and by squared cells of the surface, in a band both by the latter. One is over before the next begins.
 _MEMORY = {"diagram": 33.0, "sample": 2e-3, "field": 20.0, "node": 31e-6, "meshes": 52.0, "held node": 2.2e-6}  # MiB
-_SQUARED_CELL = 4.9e-3  # MiB
+_SQUARED_CELL = 4.6e-3  # MiB
 _BAND_MEMORY = {"field": 110.0, "surface": 3.4e-3}  # MiB
 _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
 _POISSON_NODE = 40e-6  # MiB
