@@ -84,7 +84,7 @@ def test_a_clock_that_ticks_slowly_does_for_the_probe(monkeypatch):
 def test_a_grid_without_room_for_the_offset_is_not_advised():
     grid, spacing = fit_grid(np.array([[0, 0, 0], [1, 1, 1.0]]), 400), np.full(1000, 0.1)
     for offset, advised in ((1.0, "use resolution 32 or less"), (4.0, "lower the offset")):
-        settings = Settings(resolution=400, offset=offset, memory_limit=85.0)
+        settings = Settings(resolution=400, offset=offset, memory_limit=83.0)
         with pytest.raises(MemoryBudgetError, match=advised):
             check_budget(estimate_cost(spacing, grid, settings), spacing, grid, settings)
 
