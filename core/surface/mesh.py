@@ -52,6 +52,12 @@ class Mesh:
         rows = np.concatenate([first, self.pairs + first, np.flatnonzero(rest)])
         return replace(self, faces=self.faces[rows], pairs=len(first))
 
+    def with_halves(self, chosen: np.ndarray) -> np.ndarray:
+        """The faces `chosen`, (f,) bool, with the other halves of their quads."""
+        found, halves = chosen.copy(), chosen[: 2 * self.pairs].reshape(2, -1)
+        found[: 2 * self.pairs] = np.tile(halves[0] | halves[1], 2)
+        return found
+
     def part(self, kept: np.ndarray) -> "Mesh":
         """The mesh of the faces marked in `kept`, as :meth:`of_faces`, with their vertices alone."""
         mesh = self.of_faces(kept)

@@ -47,8 +47,7 @@ def _around_slivers(mesh, cell):
     for _ in range(2):
         vertices = np.zeros(len(mesh.vertices), bool)
         vertices[mesh.faces[near]] = True
-        near = vertices[mesh.faces].any(axis=1)
-        near[: 2 * mesh.pairs] = np.tile(near[: 2 * mesh.pairs].reshape(2, -1).any(axis=0), 2)
+        near = mesh.with_halves(vertices[mesh.faces].any(axis=1))
     return near
 
 

@@ -37,7 +37,7 @@ def unfolded(mesh: Mesh, surface: LocalSurface, cell: float, held: np.ndarray | 
     near[near] = _folded(*_cut_out(mesh, near)[1:])[0]
     if not near.any():
         return mesh
-    near = _with_halves(mesh, _at(mesh, _grown(mesh, near, _AROUND)))
+    near = mesh.with_halves(_at(mesh, _grown(mesh, near, _AROUND)))
     row, part, cut = _cut_out(mesh, near)
     for stays in (cut | np.broadcast_to(held, len(mesh.vertices))[row], cut):
         for rings in range(_RINGS):
@@ -78,7 +78,7 @@ def _distance(points, vertices, faces):
 
 def _beside_folds(mesh):
     """Which faces have a vertex next to a fold, or are half of a quad that has, (f,) bool."""
-    return _with_halves(mesh, _at(mesh, mesh.normals[1] < _BENT))
+    return mesh.with_halves(_at(mesh, mesh.normals[1] < _BENT))
 
 
 def _cut_out(mesh, near):
@@ -88,13 +88,6 @@ def _cut_out(mesh, near):
     beyond = np.zeros(len(mesh.vertices), bool)
     beyond[mesh.faces[~near]] = True
     return row, mesh.part(near), beyond[row]
-
-
-def _with_halves(mesh, chosen):
-    """The faces `chosen`, (f,) bool, with the other halves of their quads."""
-    found, halves = chosen.copy(), chosen[: 2 * mesh.pairs].reshape(2, -1)
-    found[: 2 * mesh.pairs] = np.tile(halves[0] | halves[1], 2)
-    return found
 
 
 def _at(mesh, chosen):
