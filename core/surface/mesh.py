@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
 
 from ..linalg import cross, lengths
 from ..parallel import over_rows
 from ..parts import connected_parts
+from .mesh_edges import Edges
 
 AT_ONCE = 1 << 15  # faces
 
@@ -37,9 +37,19 @@ class Mesh:
         return self.faces[2 * self.pairs :]
 
     @cached_property
+    def edges(self) -> Edges:
+        return Edges(self.faces, len(self.vertices))
+
+    @cached_property
     def normals(self) -> tuple[np.ndarray, np.ndarray]:
         """What :func:`vertex_normals` gives."""
         return vertex_normals(self.vertices, self.faces)
+
+    def moved(self, vertices: np.ndarray) -> "Mesh":
+        """The mesh with its vertices at other places, (v,3), and the same :attr:`edges`."""
+        mesh = replace(self, vertices=vertices)
+        vars(mesh)["edges"] = self.edges
+        return mesh
 
     def of_faces(self, kept: np.ndarray, paired: np.ndarray | None = None) -> "Mesh":
         """The mesh of the faces marked in `kept`, (f,) bool, in the same order. A quad stays one where both its halves
@@ -84,8 +94,8 @@ class Mesh:
 
     def edge_counts(self) -> tuple[np.ndarray, np.ndarray]:
         """Undirected edges, (e,2) int, and how many faces each has, (e,) int: 1 at a border, 2 inside a manifold."""
-        ends, count = edges_of(self.faces, len(self.vertices))
-        return np.stack(ends, axis=1).astype(self.faces.dtype), count
+        edges = self.edges
+        return np.stack([edges.low, edges.high], axis=1).astype(self.faces.dtype), edges.count
 
     def border_loops(self) -> int:
         """Number of connected curves that the border edges (those of one face) form."""
@@ -119,50 +129,11 @@ def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
     return list(found)
 
 
-def edge_numbers(faces: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Number of the edge from each corner to the next of triangles or quads (f,k) over n vertices, (f,k) int, and how
-    many faces each edge has, (e,) int; numbered as in :func:`edges_of`."""
-    table = edge_table(faces, n)
-    count, table.data = table.data, np.arange(len(table.data))
-    return looked_up(table, faces, np.roll(faces, -1, axis=1)), count
-
-
-def faces_across(edge: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both faces, (p,) int64 each, of the edges that have two, in order, by what :func:`edge_numbers` gives."""
-    owner, edge = np.repeat(np.arange(len(edge)), edge.shape[1]), edge.reshape(-1)
-    inner, last = count == 2, np.empty(len(count), np.int64)
-    last[edge] = owner
-    return (np.bincount(edge, owner).astype(np.int64) - last)[inner], last[inner]
-
-
 def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices (v,3) that faces (f,k) have, and the faces with their numbers."""
     used = np.zeros(len(vertices), bool)
     used[faces] = True
     return vertices[used], (np.cumsum(used) - 1)[faces]
-
-
-def edges_of(faces: np.ndarray, n: int) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Both ends, (e,) int64 each and the lower one first, of the edges of triangles or quads (f,k) over n vertices, in
-    order, and how many faces each edge has, (e,) int."""
-    table = edge_table(faces, n)
-    return (np.repeat(np.arange(n), np.diff(table.indptr)), table.indices.astype(np.int64)), table.data
-
-
-def edge_table(faces: np.ndarray, n: int) -> csr_matrix:
-    """How many faces each edge of triangles or quads (f,k) over n vertices has, (n,n) sparse, at its lower end and its
-    higher one. Entries are in order; counting them so is several times as quick as sorting numbers of edges."""
-    tail, head = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    ends = np.minimum(tail, head), np.maximum(tail, head)
-    return coo_matrix((np.ones(len(tail), np.int32), ends), shape=(n, n)).tocsr()
-
-
-def looked_up(table: csr_matrix, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
-    """What a table of edges holds for those between vertices `tail` and `head`, of one shape; 0 where it has none."""
-    low, high = np.minimum(tail, head).reshape(-1), np.maximum(tail, head).reshape(-1)
-    if not len(low):  # of nothing SciPy gives another sparse array
-        return np.zeros(tail.shape, table.dtype)
-    return np.asarray(table[low, high]).reshape(tail.shape)
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

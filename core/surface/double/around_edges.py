@@ -8,15 +8,13 @@ import numpy as np
 
 from ...linalg import cross, dots, lengths, symmetric
 from ...parts import connected_parts
-from ..mesh import Mesh, edges_of, faces_across
+from ..mesh import Mesh
 
 
-def order_around(sheet: Mesh, edge: np.ndarray, count: np.ndarray) -> np.ndarray:
+def order_around(sheet: Mesh) -> np.ndarray:
     """The corners (3 f,) of all triangles of a sheet, each standing for the edge from there to the next corner, by edge
-    and around each edge in the order of the faces, turning one way about the direction from its lower vertex.
-
-    edge, count : what :func:`edge_numbers` gives of the sheet
-    """
+    and around each edge in the order of the faces, turning one way about the direction from its lower vertex."""
+    edge, count = sheet.edges.number, sheet.edges.count
     order, several = np.argsort(edge.reshape(-1), kind="stable"), np.repeat(count, count)
     line = np.flatnonzero(several > 2)
     if not len(line):
@@ -28,7 +26,7 @@ def order_around(sheet: Mesh, edge: np.ndarray, count: np.ndarray) -> np.ndarray
     sorted_ = np.lexsort((angle, on))
     order[line], angle = order[line][sorted_], angle[sorted_]
     three = line[several[line] == 3].reshape(-1, 3)
-    order[three] = _as_along_lines(sheet, edge, count, order[three], angle[several[line] == 3].reshape(-1, 3))
+    order[three] = _as_along_lines(sheet, order[three], angle[several[line] == 3].reshape(-1, 3))
     return order
 
 
@@ -37,13 +35,13 @@ def corner_after(corner: np.ndarray) -> np.ndarray:
     return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
-def _as_along_lines(sheet, edge, count, order, angle):
+def _as_along_lines(sheet, order, angle):
     """The corners (e,3) of edges of three faces, in the order that most edges of the same line have, by how far apart
     their angles (e,3) are, between the same three strips. Since strips are wound alike, one of them tells which way the
     line goes, and another that is there twice goes along the line both ways."""
     corner = sheet.faces.reshape(-1)
     tail, head = corner[order], corner[corner_after(order)]
-    strip = _strips(sheet, edge, count)[order // 3]
+    strip = _strips(sheet)[order // 3]
     alone = (strip != np.roll(strip, 1, axis=1)) & (strip != np.roll(strip, -1, axis=1))
     turned = (np.where(alone, strip, len(sheet.faces)).argmin(axis=1)[:, None] + np.arange(3)) % 3
     order, strip, upwards = (np.take_along_axis(x, turned, axis=1) for x in (order, strip, tail < head))
@@ -60,16 +58,13 @@ def _as_along_lines(sheet, edge, count, order, angle):
     return order
 
 
-def _strips(sheet, edge, count):
+def _strips(sheet):
     """The number of the strip beside a line that each face is in, (f,): faces follow each other there around vertices
     where the line goes on, and are wound alike. At its ends the strips on its sides would be one."""
-    (low, high), n = edges_of(sheet.faces, len(sheet.vertices))[0], len(sheet.vertices)
-    line, inner = count > 2, count == 2
-    goes_on = np.bincount(np.concatenate([low[line], high[line]]), minlength=n) == 2
-    upwards = np.bincount(edge.reshape(-1), (sheet.faces < np.roll(sheet.faces, -1, axis=1)).reshape(-1))
-    linked = (upwards == 1)[inner] & (goes_on[low] | goes_on[high])[inner]
-    pair = (face[linked] for face in faces_across(edge, count))
-    return connected_parts(*pair, len(sheet.faces))
+    edges = sheet.edges
+    goes_on = edges.ends_at(edges.count > 2) == 2
+    linked = edges.alike & (goes_on[edges.low] | goes_on[edges.high])[edges.count == 2]
+    return connected_parts(*(face[linked] for face in edges.beside), len(sheet.faces))
 
 
 def _angles(sheet, low, high, third):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...linalg import cross, lengths
-from ..mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
+from ..mesh import Mesh, at_corners
 from .around_edges import corner_after, order_around
 from .layers import HAIR
 
@@ -66,9 +66,8 @@ def _sides(sheet):
     side of the next one that faces back; of a face alone, both its sides. So the sides around a vertex follow each
     other in cycles: from low end to low end one way, from high end to high end the other."""
     corner, corners = sheet.faces.reshape(-1), sheet.faces.size
-    edge, count = edge_numbers(sheet.faces, len(sheet.vertices))
-    order, several = order_around(sheet, edge, count), np.repeat(count, count)
-    edge = edge.reshape(-1)
+    edge, count = sheet.edges.number.reshape(-1), sheet.edges.count
+    order, several = order_around(sheet), np.repeat(count, count)
     here, after = np.arange(corners), corner_after(np.arange(corners))
     upwards = corner < corner[after]
     ends = np.stack([np.where(upwards, here, after), np.where(upwards, after, here)])
@@ -150,15 +149,12 @@ def _halved(mesh, middle):
 def _turned(sheet):
     """The sheet with the diagonal of each quad turned that leads from border to border where the other one does not,
     and is no edge."""
-    ends, count = edges_of(sheet.faces, len(sheet.vertices))
-    on_border = np.zeros(len(sheet.vertices), bool)
-    on_border[np.stack(ends)[:, count == 1]] = True
-    quads = sheet.quads
+    on_border, quads = sheet.edges.ends_at(sheet.edges.count == 1) > 0, sheet.quads
     row = np.flatnonzero(on_border[quads[:, ::2]].all(axis=1) & ~on_border[quads[:, 1::2]].all(axis=1))
     if not len(row):
         return sheet
-    (a, b, c, d), table = quads[row].T, edge_table(sheet.faces, len(sheet.vertices))
-    row = row[(looked_up(table, a, c) == 2) & (looked_up(table, b, d) == 0)]
+    a, b, c, d = quads[row].T
+    row = row[(sheet.edges.faces_between(a, c) == 2) & (sheet.edges.faces_between(b, d) == 0)]
     faces = sheet.faces.copy()
     faces[row], faces[sheet.pairs + row] = quads[row][:, [1, 2, 3]], quads[row][:, [1, 3, 0]]
     return replace(sheet, faces=faces)

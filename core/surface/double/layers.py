@@ -3,8 +3,6 @@
 Both are pulled onto the surface, and where it bends the triangles of either are other chords of it.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -51,7 +49,7 @@ def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
     step = np.zeros(len(mesh.vertices))
     for corner in (*ends, *mesh.faces[face].T):
         np.maximum.at(step, corner, lack)
-    return replace(mesh, vertices=mesh.vertices + step[:, None] * bend.normal)
+    return mesh.moved(mesh.vertices + step[:, None] * bend.normal)
 
 
 def _other_layer(mesh, place, outward, cell, progress):

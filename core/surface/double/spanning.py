@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import symmetric
-from ..mesh import edges_of
+from ..mesh_edges import Edges
 
 _BESIDE = 2.0  # levels from an opening that is shut, within which vertices on rims span it, too
 _STRETCHED = 3.0  # cells, length of edges; those of the iso-surface have 1.4 at most
@@ -34,7 +34,8 @@ def stretched_vertices(vertices, faces, surface: LocalSurface, cell: float) -> n
     """Which vertices (v,3) of triangles or quads (f,k), each on a foot point, are the ends of edges much longer than
     those of the grid whose middles lie off the surface, (v,) bool: where the iso-surface joins sheets, its faces are
     drawn out into spikes from one to the other."""
-    (tail, head), _ = edges_of(faces, len(vertices))
+    edges = Edges(faces, len(vertices))
+    tail, head = edges.low, edges.high
     far = np.flatnonzero(((vertices[tail] - vertices[head]) ** 2).sum(axis=1) > (_STRETCHED * cell) ** 2)
     middle = 0.5 * (vertices[tail[far]] + vertices[head[far]])
     far = far[surface.project(middle).distance > _OFF * cell]
@@ -51,8 +52,8 @@ def spanned(vertices: np.ndarray, faces: np.ndarray, loose: np.ndarray) -> np.nd
     if not len(free):
         return moved
     n = len(vertices)
-    (tail, head), _ = edges_of(faces, n)
-    links = symmetric(np.ones(len(tail)), tail, head, n)
+    edges = Edges(faces, n)
+    links = symmetric(np.ones(len(edges.low)), edges.low, edges.high, n)
     row = np.flatnonzero(loose | (links @ loose.astype(float) > 0))
     links = links[row]
     links.data /= np.repeat(np.diff(links.indptr), np.diff(links.indptr))

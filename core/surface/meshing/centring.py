@@ -3,7 +3,7 @@
 Where vertices lie on the surface, faces are chords: all of them inside of a ball, for instance.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -58,7 +58,7 @@ class Bend:
 
     def moved(self, mesh: Mesh, step: np.ndarray) -> Mesh:
         """The mesh with the vertices that may move by `step` (v,) along their normals."""
-        return replace(mesh, vertices=mesh.vertices + np.where(self.free, step, 0.0)[:, None] * self.normal)
+        return mesh.moved(mesh.vertices + np.where(self.free, step, 0.0)[:, None] * self.normal)
 
 
 def bend_of(mesh: Mesh) -> Bend:

@@ -7,7 +7,7 @@ from ...linalg import row_dots
 from ...lookup import numbered
 from ...parts import connected_parts
 from ...progress import Progress
-from ..mesh import edges_of
+from ..mesh_edges import Edges
 from .planes import to_planes
 
 _TURN = 0.7  # largest cosine between the sides of sheets that form a corner
@@ -37,7 +37,8 @@ def into_corners(
     to the corner go first. They stay where that would take them far or off the surface, between sheets that run close
     for instance.
     """
-    (low, high), _ = edges_of(faces, len(vertices))
+    edges = Edges(faces, len(vertices))
+    low, high = edges.low, edges.high
     turn = row_dots(side[low], side[high])
     bent = (turn > _FACING) & (turn < _TURN)
     low, high = low[bent], high[bent]

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ...linalg import row_dots, symmetric
-from ..mesh import edges_of, vertex_normals
+from ..mesh import vertex_normals
+from ..mesh_edges import Edges
 
 _ROUNDS, _DAMPING = 5, 0.5
 FLAT = 0.9  # least cosine between the normals of a vertex and of each face around it, where it may move
@@ -17,12 +18,10 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     surface bends within a face or two, at creases for instance.
     """
     n = len(vertices)
-    (tail, head), count = edges_of(faces, n)
+    edges = Edges(faces, n)
     normal, least = vertex_normals(vertices, faces)
-    free = ~fixed & (least >= FLAT)
-    free[np.concatenate([tail[count != 2], head[count != 2]])] = False
-    free = np.flatnonzero(free)
-    links = symmetric(np.ones(len(tail)), tail, head, n)
+    free = np.flatnonzero(~fixed & (least >= FLAT) & (edges.ends_at(edges.count != 2) == 0))
+    links = symmetric(np.ones(len(edges.low)), edges.low, edges.high, n)
     links, normal, moved = links[free], normal[free], vertices.copy()
     links.data /= np.repeat(np.diff(links.indptr), np.diff(links.indptr))
     here = moved[free]

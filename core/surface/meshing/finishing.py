@@ -1,7 +1,5 @@
 """Meshes whose vertices lie on the surface, made sharp, free of folds, and centred on it."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...field.local_surface import LocalSurface
@@ -48,7 +46,7 @@ def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: floa
         beside = mesh.faces[known[mesh.faces].sum(axis=1) >= 2]
         moved = into_corners(vertices, beside, side, surface, cell, part.part(0.5, 1.0), farthest)
         if (moved != vertices).any():
-            mesh = replace(mesh, vertices=moved)
+            mesh = mesh.moved(moved)
     return mesh
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...linalg import cross, dots, lengths, symmetric
-from ..mesh import Mesh, at_corners, edge_numbers, edge_table, edges_of, looked_up
+from ..mesh import Mesh, at_corners
 
 _SHORT = 0.3  # cells, edges whose ends become one
 _FLAT = 0.15  # height of triangles over their longest side, below which this is turned
@@ -66,7 +66,7 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     a neighbour more than these three faces (T. Dey et al., Topology preserving edge contraction, 1999).
     """
     n, x = len(mesh.vertices), mesh.vertices
-    (low, high), _ = edges_of(mesh.faces, n)
+    low, high = mesh.edges.low, mesh.edges.high
     length = ((x[low] - x[high]) ** 2).sum(axis=1)
     short = chance.permutation(np.flatnonzero((length < shortest**2) & free[low] & free[high]))
     links = symmetric(np.ones(len(low), np.int32), low, high, n)
@@ -121,17 +121,17 @@ def _straightness(mesh):
 def _with_sides_turned(mesh, free, cell):
     """The mesh with the longest sides of flat triangles turned whose apex is `free`, (v,) bool; of as many at once as
     have no face in common."""
-    faces, n = mesh.faces, len(mesh.vertices)
+    faces = mesh.faces
     corners = at_corners(mesh.vertices, faces)
     flatness, longest = _shape(*corners)
     row = np.flatnonzero((flatness < _FLAT) & (flatness * longest < _LOW * cell))
     row = row[np.argsort(flatness[row], kind="stable")]
     top = np.argmax([lengths(corners[k - 2][:, row] - corners[k - 1][:, row]) for k in range(3)], axis=0)
-    edge, count = edge_numbers(faces, n)
-    side = edge[row, (top + 1) % 3]
-    inner = free[faces[row, top]] & (count[side] == 2)
+    edges = mesh.edges
+    side = edges.number[row, (top + 1) % 3]
+    inner = free[faces[row, top]] & (edges.count[side] == 2)
     row, top, side = row[inner], top[inner], side[inner]
-    other = np.bincount(edge.reshape(-1), np.repeat(np.arange(len(faces)), 3))[side].astype(np.int64) - row
+    other = np.bincount(edges.number.reshape(-1), np.repeat(np.arange(len(faces)), 3))[side].astype(np.int64) - row
     c, a, b = (faces[row, (top + k) % 3] for k in range(3))
     d = faces[other].sum(axis=1, dtype=faces.dtype) - a - b
     turned = [np.stack([c, a, d], axis=1), np.stack([c, d, b], axis=1)]
@@ -140,7 +140,7 @@ def _with_sides_turned(mesh, free, cell):
     normal = _normals(*(corner[:, other] for corner in corners))
     for each in places:
         better &= _alike(normal, _normals(*each), cell)
-    better &= (c != d) & (looked_up(edge_table(faces, n), c, d) == 0)
+    better &= (c != d) & (edges.faces_between(c, d) == 0)
     can = np.flatnonzero(better)
     first = np.full(len(faces), len(row))
     for face in (row, other):

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ...parallel import over_rows
-from ..mesh import AT_ONCE, Mesh, at_corners, edge_table, looked_up, vertex_normals
+from ..mesh import AT_ONCE, Mesh, at_corners, vertex_normals
+from ..mesh_edges import Edges
 from .evening import FLAT
 from .fillings import edge_keys
 
@@ -37,7 +38,7 @@ def triangles(vertices, faces):
         other[part] = np.where(told, other_rise < rise, other_length < length)
 
     over_rows(choose, len(faces), AT_ONCE)
-    clash = looked_up(edge_table(faces, len(vertices)), faces[:, :2], faces[:, 2:]) > 0
+    clash = Edges(faces, len(vertices)).faces_between(faces[:, :2], faces[:, 2:]) > 0
     other = np.where(clash[:, 0] != clash[:, 1], clash[:, 0], other)
     chosen = edge_keys(np.where(other[:, None], faces[:, 1::2], faces[:, ::2]), len(vertices))
     _, first, count = np.unique(chosen, return_index=True, return_counts=True)

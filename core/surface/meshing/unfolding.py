@@ -1,7 +1,5 @@
 """Faces that lie back to front on their neighbours, where vertices of a mesh went past one another."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
@@ -9,7 +7,7 @@ from scipy.spatial import KDTree
 from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, lengths
 from ...parts import connected_parts
-from ..mesh import Mesh, at_corners, edge_numbers, edges_of, faces_across
+from ..mesh import Mesh, at_corners
 
 _FOLD = -0.5  # cosine between the normals of two faces, below which there is a fold between them
 _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; at a fold one has less
@@ -56,7 +54,7 @@ def _where_it_covers(mesh, before, surface, cell):
     """The mesh with vertices as they were `before`, (v,3), where samples come to lie off it: as tips and thin plates do
     that get blunt."""
     moved = (mesh.vertices != before).any(axis=1)
-    (low, high), _ = edges_of(mesh.faces, len(before))
+    low, high = mesh.edges.low, mesh.edges.high
     inside = moved[low] & moved[high]
     group = connected_parts(low[inside], high[inside], len(before))
     vertex = np.flatnonzero(moved)
@@ -66,7 +64,7 @@ def _where_it_covers(mesh, before, surface, cell):
     was, now = (_distance(surface.points[sample], x, mesh.faces) for x in (before, mesh.vertices))
     bare = now > np.maximum(was + _BARER * cell, _BARE * cell)
     back = np.isin(group, group_of[bare])
-    return replace(mesh, vertices=np.where(back[:, None], before, mesh.vertices))
+    return mesh.moved(np.where(back[:, None], before, mesh.vertices))
 
 
 def _distance(points, vertices, faces):
@@ -108,20 +106,16 @@ def _grown(mesh, chosen, rings):
 def _folded(mesh, cut):
     """Which faces are few between folds, (f,) bool: connected to no more across edges that are no folds, nor to what is
     `cut` off, (v,) bool; and which vertices are on folds between many faces, (v,) bool."""
-    faces, (a, b, c) = mesh.faces, at_corners(mesh.vertices, mesh.faces)
-    normal, edges = cross(b - a, c - a), (b - a, c - b, a - c)
+    a, b, c = at_corners(mesh.vertices, mesh.faces)
+    normal, sides = cross(b - a, c - a), (b - a, c - b, a - c)
     double = lengths(normal)
     normal /= np.maximum(double, np.finfo(float).tiny)
-    flat = double <= _FLAT * np.max([dots(edge, edge) for edge in edges], axis=0)
-    edge, count = edge_numbers(faces, len(mesh.vertices))
-    one, other = faces_across(edge, count)
-    forward = faces < np.roll(faces, -1, axis=1)
-    alike = np.bincount(edge.reshape(-1), forward.reshape(-1))[count == 2] == 1
-    cosine = dots(*(normal.take(face, axis=1) for face in (one, other))) * np.where(alike, 1, -1)
+    flat = double <= _FLAT * np.max([dots(side, side) for side in sides], axis=0)
+    (one, other), low, high, count = mesh.edges.beside, mesh.edges.low, mesh.edges.high, mesh.edges.count
+    cosine = dots(*(normal.take(face, axis=1) for face in (one, other))) * np.where(mesh.edges.alike, 1, -1)
     fold = (cosine < _FOLD) | flat[one] | flat[other]
-    patch = connected_parts(one[~fold], other[~fold], len(faces))
-    (low, high), _ = edges_of(faces, len(mesh.vertices))
-    goes_on = ((count == 1) & cut[low] & cut[high])[edge].any(axis=1)
+    patch = connected_parts(one[~fold], other[~fold], len(mesh.faces))
+    goes_on = ((count == 1) & cut[low] & cut[high])[mesh.edges.number].any(axis=1)
     few = (np.bincount(patch)[patch] <= _FEW) & ~np.isin(patch, patch[goes_on])
     beside = np.isin(patch, patch[np.append(one[fold], other[fold])])
     at = np.flatnonzero(count == 2)[fold & ~few[one] & ~few[other]]
@@ -134,11 +128,10 @@ def _flaps(mesh, folded, cut):
     """The faces that are `folded`, (f,) bool, at a border that stays a simple curve without them, (f,) bool, no two of
     them with the corner across it in common; what is `cut` off, (v,) bool, is no border. None at a line of more than
     two faces, unless this is no more than an edge of three."""
-    flaps, (edge, count) = np.zeros(len(folded), bool), edge_numbers(mesh.faces, len(mesh.vertices))
-    (low, high), _ = edges_of(mesh.faces, len(mesh.vertices))
-    on_line, on_border = (_ends_at(low, high, kind, len(mesh.vertices)) for kind in (count > 2, count == 1))
-    border = (count == 1) & ~(cut[low] & cut[high])
-    lone = (count == 3) & (on_line[low] == 1) & (on_line[high] == 1)
+    flaps, edges, edge, count = np.zeros(len(folded), bool), mesh.edges, mesh.edges.number, mesh.edges.count
+    on_line, on_border = (edges.ends_at(kind) for kind in (count > 2, count == 1))
+    border = (count == 1) & ~(cut[edges.low] & cut[edges.high])
+    lone = (count == 3) & (on_line[edges.low] == 1) & (on_line[edges.high] == 1)
     row = np.flatnonzero(folded & border[edge].any(axis=1) & ((count <= 2) | lone)[edge].all(axis=1))
     at = border[edge[row]]
     across = np.take_along_axis(mesh.faces[row], (at.argmax(axis=1)[:, None] + 2) % 3, axis=1)[:, 0]
@@ -148,17 +141,12 @@ def _flaps(mesh, folded, cut):
     return flaps
 
 
-def _ends_at(low, high, chosen, n):
-    """How many edges of those `chosen`, (e,) bool, each vertex has, (n,) int."""
-    return np.bincount(np.append(low[chosen], high[chosen]), minlength=n)
-
-
 def _relaxed(mesh, chosen, surface, cell):
     """The mesh with the vertices `chosen`, (v,) bool, that may move among their neighbours."""
-    n, vertices = len(mesh.vertices), mesh.vertices.copy()
-    (low, high), count = edges_of(mesh.faces, n)
-    on_line, on_border = (_ends_at(low, high, kind, n) for kind in (count > 2, count == 1))
-    tail, head, line = np.append(low, high), np.append(high, low), np.tile(count > 2, 2)
+    n, vertices, edges = len(mesh.vertices), mesh.vertices.copy(), mesh.edges
+    on_line, on_border = (edges.ends_at(kind) for kind in (edges.count > 2, edges.count == 1))
+    tail, head = np.append(edges.low, edges.high), np.append(edges.high, edges.low)
+    line = np.tile(edges.count > 2, 2)
     stays = on_line > 2
     for _ in range(_BRANCH):
         stays[tail[line & stays[head]]] = True
@@ -174,4 +162,4 @@ def _relaxed(mesh, chosen, surface, cell):
     found = surface.project(vertices[row])
     on = found.distance <= _ON * cell
     vertices[row[on]] -= found.step[on]
-    return replace(mesh, vertices=vertices)
+    return mesh.moved(vertices)

@@ -1,7 +1,5 @@
 """Lines where sheets of a single layer meet."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...field.local_surface import LocalSurface
@@ -33,7 +31,7 @@ def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None
     for _ in range(_ROUNDS):
         step = to_planes(vertices[line], sheets.node, sheets.foot, sheets.axis, _STIFFNESS)
         vertices[line[meet]] += step[meet]
-    return replace(mesh, vertices=vertices)
+    return mesh.moved(vertices)
 
 
 def _around(edges, line, n):

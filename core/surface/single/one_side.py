@@ -6,7 +6,7 @@ from ...field.blocks import Blocks, at_nodes
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import cross, lengths, symmetric
-from ..mesh import Mesh, at_corners, edge_numbers, faces_across
+from ..mesh import Mesh, at_corners
 from ..meshing.pieces import pieces_with_samples
 
 _OFF = 0.7, 1.0, 1.3  # cells from a face, where its side is told
@@ -30,7 +30,7 @@ def one_side(cover: Mesh, signed: np.ndarray | Blocks, surface: LocalSurface, gr
     for off in _OFF:
         found = at_nodes(signed, grid.nearest_nodes((middle + off * grid.spacing * normal).T))
         side += np.where(np.abs(found) <= _KNOWN * grid.spacing, np.sign(found), 0) / len(_OFF)
-    pairs = faces_across(*edge_numbers(cover.faces, len(cover.vertices)))
+    pairs = cover.edges.beside
     beside = symmetric(np.ones(len(pairs[0])), *pairs, len(cover.faces))
     for _ in range(_ROUNDS):
         side = 0.5 * (side + beside @ np.sign(side) / 3)

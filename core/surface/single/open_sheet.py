@@ -10,7 +10,8 @@ from ...lookup import numbered
 from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.first_steps import first_steps
-from ..mesh import Mesh, edge_numbers, in_use
+from ..mesh import Mesh, in_use
+from ..mesh_edges import Edges
 from ..meshing.evening import evened
 from ..meshing.pieces import pieces_with_samples
 from ..meshing.triangles import mesh_of
@@ -72,7 +73,7 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
 
 def _apart(vertices, faces):
     """With a vertex for each of the sheets that have no more than it in common."""
-    sheet = _connected(edge_numbers(faces, len(vertices))[0]).astype(np.int64)
+    sheet = _connected(Edges(faces, len(vertices)).number).astype(np.int64)
     key, corners = numbered(faces + len(vertices) * sheet[:, None])
     return vertices[key % len(vertices)], corners
 

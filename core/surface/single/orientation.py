@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...linalg import cross, dots, lengths, symmetric
-from ..mesh import Mesh, at_corners, edge_numbers, faces_across
+from ..mesh import Mesh, at_corners
 from ..signs.spreading import spread_signs, spread_strongest
 
 _SMOOTH = 0.7  # least cosine between the normals of two faces across whose edge a surface is smooth
@@ -24,13 +24,10 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     n = len(mesh.faces)
     if not n:
         return mesh, 0
-    edge, count = edge_numbers(mesh.faces, len(mesh.vertices))
-    pair, forward = np.stack(faces_across(edge, count)), mesh.faces < np.roll(mesh.faces, -1, axis=1)
-    against = np.bincount(edge.reshape(-1), forward.reshape(-1))[count == 2] != 1
-
+    pair, against = np.stack(mesh.edges.beside), ~mesh.edges.alike
     a, b, c = at_corners(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
     normal = cross(b - a, c - a)
-    sign, patch = _spread(np.where(against, -1.0, 1.0), pair, normal, _beside_lines(mesh.faces, edge, count))
+    sign, patch = _spread(np.where(against, -1.0, 1.0), pair, normal, _beside_lines(mesh))
     turned = sign < 0
     outwards = dots(normal, a)
     inwards = np.bincount(patch, np.where(turned, -outwards, outwards)) < 0
@@ -42,11 +39,11 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     return _with_turned(mesh, turned), failures
 
 
-def _beside_lines(faces, edge, count):
+def _beside_lines(mesh):
     """Which faces have a vertex in common with one at an edge of three faces or more, (f,) bool."""
-    near = np.zeros(faces.max() + 1, bool)
-    near[faces[(count[edge] > 2).any(axis=1)]] = True
-    return near[faces].any(axis=1)
+    at_line, near = (mesh.edges.count > 2)[mesh.edges.number].any(axis=1), np.zeros(len(mesh.vertices), bool)
+    near[mesh.faces[at_line]] = True
+    return near[mesh.faces].any(axis=1)
 
 
 def _spread(relation, pair, normal, beside):

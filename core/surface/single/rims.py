@@ -8,15 +8,13 @@ At corners (see :mod:`.rim_corners`) it turns as it likes. Reweighting keeps oth
 and holds back vertices that go far.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ...field.local_surface import LocalSurface
 from ...linalg import COMPONENTS, cross, lengths, principal_axes, row_dots, shortened, unit
-from ..mesh import Mesh, at_corners, edge_numbers
+from ..mesh import Mesh, at_corners
 from .rim_corners import Border
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
@@ -34,7 +32,7 @@ _RELAXED, _DAMPING = 10, 0.5
 def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     """The mesh's vertices (v,3) with those at borders where they fall on the surface from a cell further out: at its
     rims, where these are that near, and a cell and a half off at most."""
-    way = _outward(mesh.vertices, mesh.faces)
+    way = _outward(mesh)
     loop = np.flatnonzero(way.any(axis=1))
     if not len(loop):
         return mesh.vertices
@@ -78,7 +76,7 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     graph = graph + graph.T
     row = np.flatnonzero(_grown(ends > 0, graph, rows) & ~_grown(fixed, graph, _CLEAR) & (ends == 0))
     if not len(row):
-        return replace(mesh, vertices=vertices)
+        return mesh.moved(vertices)
     graph, axis = graph[row], _axes(mesh, row)
     degree = np.diff(graph.indptr).astype(float)
     vertices[row] += spsolve((diags(degree) - graph[:, row]).tocsc(), graph @ moved)
@@ -86,14 +84,14 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
         step = _DAMPING * (graph @ vertices / degree[:, None] - vertices[row])
         vertices[row] += step - row_dots(step, axis)[:, None] * axis
     _settle(vertices, row, axis, surface)
-    return replace(mesh, vertices=vertices)
+    return mesh.moved(vertices)
 
 
-def _outward(vertices, faces):
+def _outward(mesh):
     """Directions (v,3) out of the faces at their borders, zero elsewhere: sums over border edges, by their length."""
-    tail, head, third = (np.roll(faces, -k, axis=1).reshape(-1).astype(np.int64) for k in range(3))
-    edge, count = edge_numbers(faces, len(vertices))
-    border = (count[edge] == 1).reshape(-1)
+    vertices, edges = mesh.vertices, mesh.edges
+    tail, head, third = (np.roll(mesh.faces, -k, axis=1).reshape(-1).astype(np.int64) for k in range(3))
+    border = (edges.count[edges.number] == 1).reshape(-1)
     tail, head, third = tail[border], head[border], third[border]
     along = vertices[head] - vertices[tail]
     squared = np.maximum(row_dots(along, along), np.finfo(float).tiny)

@@ -9,7 +9,7 @@ import numpy as np
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
 from ...parts import connected_parts
-from ..mesh import Mesh, edge_numbers
+from ..mesh import Mesh
 
 _SMALL = 32  # faces of a patch
 _PAST = 1.5  # cells, that a spur goes past the line
@@ -20,7 +20,7 @@ _ROUNDS = 4
 def without_scraps(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
     """The mesh without spurs, and with one patch less in each pocket: of those that close it, the one farthest from the
     surface. Patches are connected across edges of two faces. No border is made where there was none."""
-    edge, counts = edge_numbers(mesh.faces, len(mesh.vertices))
+    edge, counts = mesh.edges.number, mesh.edges.count.copy()
     if (counts <= 2).all():
         return mesh
     label = _patches(edge, counts)

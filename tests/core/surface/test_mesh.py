@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from core import Mesh
-from core.surface.mesh import edge_numbers, edge_table, edges_of, in_use, looked_up
+from core.surface.mesh import in_use
 
 TETRAHEDRON = Mesh(
     np.concatenate([np.zeros((1, 3)), np.eye(3)]),
@@ -87,31 +87,14 @@ def test_joined_meshes_keep_faces_and_quads():
     np.testing.assert_array_equal(found.vertices[7:11], TETRAHEDRON.vertices)
 
 
-@pytest.mark.parametrize("corners", [3, 4])
-def test_edge_numbers_are_those_of_the_edges(corners):
-    faces = np.array([np.random.default_rng(k).permutation(12)[:corners] for k in range(20)])
-    number, count = edge_numbers(faces, 12)
-    ends, counts = edges_of(faces, 12)
-    np.testing.assert_array_equal(count, counts)
-    along = np.sort([faces, np.roll(faces, -1, axis=1)], axis=0)
-    np.testing.assert_array_equal(np.stack(ends)[:, number], along)
-
-
 def test_vertices_out_of_use_are_left_out():
     vertices, faces = in_use(np.arange(24.0).reshape(8, 3), np.array([[7, 1, 3], [3, 1, 4]]))
     np.testing.assert_array_equal(vertices[:, 0], [3, 9, 12, 21])
     np.testing.assert_array_equal(faces, [[3, 0, 1], [1, 0, 2]])
 
 
-@pytest.mark.parametrize("corners", [3, 4])
-def test_edges_are_counted_as_their_sorted_numbers_are(corners, random):
-    faces = np.array([random.permutation(12)[:corners] for _ in range(20)])
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    expected, times = np.unique(ends, axis=0, return_counts=True)
-    (low, high), counts = edges_of(faces, 12)
-    np.testing.assert_array_equal(np.stack([low, high], axis=1), expected)
-    np.testing.assert_array_equal(counts, times)
-    every = np.indices((12, 12)).reshape(2, -1)
-    known = {tuple(end): time for end, time in zip(expected.tolist(), times.tolist(), strict=True)}
-    held = looked_up(edge_table(faces, 12), *every)
-    assert held.tolist() == [known.get((min(a, b), max(a, b)), 0) for a, b in every.T.tolist()]
+def test_a_mesh_with_its_vertices_moved_has_the_same_edges():
+    moved = STRIP.moved(STRIP.vertices + 1)
+    np.testing.assert_array_equal(moved.vertices, STRIP.vertices + 1)
+    assert (moved.faces is STRIP.faces, moved.pairs, moved.edges is STRIP.edges) == (True, 2, True)
+    assert STRIP.of_faces(np.arange(5) < 4).edges is not STRIP.edges

@@ -7,7 +7,6 @@ from scipy.interpolate import LinearNDInterpolator
 from core import Cancelled, Mesh, Settings, reconstruct
 from core.progress import Progress
 from core.surface.double.layers import _other_layer, laid_apart
-from core.surface.mesh import edges_of
 from core.surface.meshing.triangles import mesh_of
 from tests import shapes
 from tests.core.surface.meshing.test_centring import ball
@@ -22,7 +21,7 @@ def both(outer, inner):
 
 def on_faces(mesh):
     """Corners, middles of edges and centroids."""
-    vertices, (low, high) = mesh.vertices, edges_of(mesh.faces, len(mesh.vertices))[0]
+    vertices, low, high = mesh.vertices, mesh.edges.low, mesh.edges.high
     return np.concatenate([vertices, 0.5 * (vertices[low] + vertices[high]), vertices[mesh.faces].mean(axis=1)])
 
 
