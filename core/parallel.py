@@ -4,7 +4,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import contextmanager, nullcontext
 from itertools import chain, islice
+from threading import local
 
 from .progress import Progress
 
@@ -13,12 +15,30 @@ _HELD = 16  # chunks begun and not yet handed on, per core: those behind a large
 _FEW = 2048  # rows, hardly worth a thread: fewer wait for the interpreter more often than they work
 _MOST_CORES = 8  # more hardly gain, and each holds chunks in memory
 
+_kept = local()  # `pool`, the threads that work for this one, where it has some
+
+
+@contextmanager
+def workers() -> Iterator[None]:
+    """Within, all that the calling thread shares out is worked on by the same threads, which end with it. Each new one
+    is waited for and has no memory at hand yet: a run that takes new ones for every loop takes some per cent longer."""
+    if hasattr(_kept, "pool"):
+        yield
+        return
+    _kept.pool = ThreadPoolExecutor(cores())
+    try:
+        yield
+    finally:
+        pool = _kept.pool
+        del _kept.pool
+        pool.shutdown(cancel_futures=True)
+
 
 def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
     """Yields (chunk, work(chunk)) in the order of `chunks`, a few of which are worked on at a time.
 
     Threads serve, since NumPy and SciPy let go of the interpreter in their loops. What an iterator of `chunks` does
-    (report progress, cancel) happens in the caller's thread; when it raises, no thread is left.
+    (report progress, cancel) happens in the caller's thread; when it raises, no thread is left at work.
     """
     chunks = iter(chunks)
     ahead = list(islice(chunks, 2))
@@ -26,7 +46,7 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
         yield from ((chunk, work(chunk)) for chunk in ahead)
         return
     at_once, chunks, begun = cores(), chain(ahead, chunks), deque()
-    with ThreadPoolExecutor(at_once) as pool:
+    with nullcontext(_kept.pool) if hasattr(_kept, "pool") else ThreadPoolExecutor(at_once) as pool:
         try:
             while True:
                 busy = [result for _, result in begun if not result.done()]
@@ -40,13 +60,18 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
                 else:
                     wait([result for _, result in begun if not result.done()], return_when=FIRST_COMPLETED)
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+            wait([result for _, result in begun if not result.cancel()])
 
 
 def work_through(work: Callable, chunks: Iterable) -> None:
     """Does `work` on all chunks as :func:`in_order` does, where it puts what it finds in place itself."""
     for _ in in_order(work, chunks):
         pass
+
+
+def side_by_side(*looks: Callable) -> list:
+    """What functions without arguments return, called at the same time."""
+    return [found for _, found in in_order(lambda look: look(), looks)]
 
 
 def even_chunks(count: int, most: int, progress: Progress) -> Iterator[slice]:

@@ -18,6 +18,7 @@ from .field.narrow_band import banded_field, trimmed
 from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
+from .parallel import workers
 from .points import local_spacing, prepare_samples, rounding_warning
 from .progress import watched
 from .reconstruction import Reconstruction
@@ -59,6 +60,7 @@ def reconstruct(
     return watched(partial(_reconstruct, points, settings, constraints, normals), progress)
 
 
+@workers()
 def _reconstruct(points, settings, constraints, normals, progress):
     if not isinstance(settings, Settings):
         raise SettingsError(f"settings are {settings!r}; give Settings(...), or nothing for the defaults")

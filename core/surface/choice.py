@@ -9,6 +9,7 @@ from ..field.blocks import Blocks
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
+from ..parallel import side_by_side
 from ..progress import Progress
 from .double.both_sides import both_sides
 from .double.double_cover import DENSE, double_cover
@@ -80,8 +81,10 @@ class Choice:
         nor even rough where sheets run side by side, and in doubt where they are closer to it than the cover extracted.
         """
         looked = self._may_be_sheet()
-        if looked and self._is_whole() and self.single.fit[0] <= (ROUGH if self.meetings.side_by_side else 1):
-            return True
+        if looked and self._is_whole():
+            (worst, _), _ = side_by_side(lambda: self.single.fit, lambda: self.both_sides)
+            if worst <= (ROUGH if self.meetings.side_by_side else 1):
+                return True
         return (looked or self._is_rough()) and self._is_closer()
 
     def _is_rough(self):

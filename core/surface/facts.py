@@ -1,16 +1,20 @@
 """What the report tells of meshes."""
 
+import numpy as np
+
 from ..parallel import in_order
 from ..progress import Progress
 from .extract import Surfaces
 from .mesh import curve_count
+from .mesh_edges import Edges
 from .meshing.pieces import piece_count
 from .meshing.quality import quad_quality, triangle_quality
 
 
 def _edge_facts(mesh):
-    edges, count = mesh.edge_counts()
-    return {"borders": curve_count(edges[count == 1]), "nonmanifold_edges": int((count > 2).sum())}
+    edges = Edges(mesh.faces, len(mesh.vertices))  # those of the mesh itself would stay in memory with it
+    border = np.stack([edges.low, edges.high], axis=1)[edges.count == 1]
+    return {"borders": curve_count(border), "nonmanifold_edges": int((edges.count > 2).sum())}
 
 
 _FACTS = (  # what takes longest first, as they are found side by side

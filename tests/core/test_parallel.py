@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.parallel import _FEW, _HELD, even_chunks, in_order, over_rows
+from core.parallel import _FEW, _HELD, even_chunks, in_order, over_rows, workers
 from core.progress import Progress
 
 CORES = os.cpu_count() or 1
@@ -72,6 +72,48 @@ def test_where_chunks_raise_no_thread_is_left():
     with pytest.raises(RuntimeError, match="cancelled"):
         list(in_order(str, chunks()))
     assert threading.active_count() == before
+
+
+def test_loops_within_share_threads_that_end_with_it():
+    def threads():
+        return {thread for _, thread in in_order(lambda _: threading.current_thread(), range(4 * CORES))}
+
+    before = threading.active_count()
+    with workers():
+        found = threads()
+        with workers():
+            found |= threads()
+        found |= threads()
+        assert len(found) <= CORES
+        assert threading.active_count() > before
+    assert threading.active_count() == before
+    assert not threads() & found
+
+
+def test_loops_may_be_begun_by_work_and_while_others_go_on():
+    with workers():
+        inner = in_order(lambda x: sum(y for _, y in in_order(abs, range(-x, 0))), range(4 * CORES))
+        outer = in_order(lambda pair: pair[1] + 1, inner)
+        assert [found for _, found in outer] == [x * (x + 1) // 2 + 1 for x in range(4 * CORES)]
+
+
+def test_what_waits_for_a_thread_is_not_begun_once_something_was_raised():
+    begun, go_on = [], threading.Event()
+
+    def work(chunk):
+        begun.append(chunk)
+        assert chunk == 0 or go_on.wait(20)
+
+    def run():
+        loop = in_order(work, range(4 * CORES))
+        with workers():
+            next(loop)
+            threading.Timer(0.2, go_on.set).start()
+            raise RuntimeError("cancelled")
+
+    with pytest.raises(RuntimeError, match="cancelled"):
+        run()
+    assert len(begun) <= CORES + 1
 
 
 def test_what_work_raises_comes_out():

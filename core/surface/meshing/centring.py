@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ...parallel import in_order, over_rows
+from ...parallel import over_rows, side_by_side
 from ..mesh import AT_ONCE, Mesh, at_corners
 from .evening import FLAT
 
@@ -26,7 +26,7 @@ def centred(mesh: Mesh) -> Mesh:
     Vertices at borders stay, and so do those at edges of more than two faces or of two that are wound unlike, and where
     the mesh bends within a face or two, at creases for instance; faces there count as flat.
     """
-    (bend, area), faces, count = _both(partial(bend_of, mesh), mesh.face_areas), mesh.faces, len(mesh.vertices)
+    (bend, area), faces, count = side_by_side(partial(bend_of, mesh), mesh.face_areas), mesh.faces, len(mesh.vertices)
     share, total = (np.bincount(faces.reshape(-1), np.repeat(x, 3), count) for x in (area * bend.at_centroids(), area))
     return bend.moved(mesh, _SHARE * share / np.maximum(total, np.finfo(float).tiny))
 
@@ -64,7 +64,7 @@ class Bend:
 def bend_of(mesh: Mesh) -> Bend:
     """How the surface bends under the faces of a mesh whose vertices lie on it."""
     vertices, faces = mesh.vertices, mesh.faces
-    (normal, least), (edges, counts) = _both(lambda: mesh.normals, mesh.edge_counts)
+    (normal, least), (edges, counts) = side_by_side(lambda: mesh.normals, mesh.edge_counts)
     sharp = least < FLAT
     free = ~sharp
     free[edges[counts != 2]] = False
@@ -78,8 +78,3 @@ def bend_of(mesh: Mesh) -> Bend:
 
     over_rows(look, len(faces), AT_ONCE)
     return Bend(normal, edges, sharp, free, turn)
-
-
-def _both(*looks):
-    """What functions return, called side by side."""
-    return [found for _, found in in_order(lambda look: look(), looks)]
