@@ -11,10 +11,13 @@ left, and at last samples are taken to planes that they share with neighbours (s
 The paper has no such step. Where there is no crease it changes nothing at all.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import row_dots, unit
+from ..parallel import in_order
 from ..progress import Progress
 from .mirrors import Mirrors
 from .planes import neighbourhoods, onto_planes
@@ -78,9 +81,9 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress
         found, suspect = agreed_share(mirrors, normals, held)
         agreed[here] = found[here]
         row = np.flatnonzero(suspect & mirrors.and_around(mirrors.and_around(changed)))
-        axes = np.empty((len(row), 3))
-        for some in progress.chunks(len(row), _CHUNK):
-            axes[some] = _densest(row[some], points, spacing, tree, normals, agreed)
+        look = partial(_densest, points=points, spacing=spacing, tree=tree, normals=normals, agreed=agreed)
+        parts = (row[some] for some in progress.chunks(len(row), _CHUNK))
+        axes = np.concatenate([np.empty((0, 3)), *(axes for _, axes in in_order(look, parts))])
         turned = np.abs(row_dots(axes, normals[row])) < np.cos(_LEAST_TURN)
         if not turned.any():
             break

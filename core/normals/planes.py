@@ -6,8 +6,12 @@ plane that halves the solid along the edge. Where the sheets are flat, the place
 one plane with the sample, to within rounding, which chance does not do.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.spatial import KDTree
+
+from ..parallel import in_order
 
 _NEIGHBOURS = 20  # of a sample, that may lie on its sheet
 _WIDTH = 1.7  # of the Gaussian of their distance, local spacings
@@ -35,12 +39,17 @@ def onto_planes(points, spacing, tree: KDTree, normals, suspect):
 
     points : (n,3) float64     spacing : (n,) local spacing     tree : of the points     normals : (n,3) unit axes
     """
-    normals, moved, rows = normals.copy(), np.zeros(len(points), bool), np.flatnonzero(suspect)
-    for first in range(0, len(rows), _CHUNK):
-        row = rows[first : first + _CHUNK]
-        axes, founded = _fullest(row, points, spacing, tree, normals)
-        normals[row[founded]], moved[row[founded]] = axes[founded], True
-    return normals, moved
+    turned, moved = normals.copy(), np.zeros(len(points), bool)
+    look = partial(_fullest, points=points, spacing=spacing, tree=tree, normals=normals)
+    for row, (axes, founded) in in_order(look, parts_of(suspect)):
+        turned[row[founded]], moved[row[founded]] = axes[founded], True
+    return turned, moved
+
+
+def parts_of(chosen):
+    """The numbers of the samples `chosen`, (n,) bool, in parts of at most 1024."""
+    row = np.flatnonzero(chosen)
+    return np.split(row, range(_CHUNK, len(row), _CHUNK))
 
 
 def _fullest(row, points, spacing, tree, normals):

@@ -5,12 +5,15 @@ whose axes are alike, to within rounding, lies on their sheet, however few of it
 and at their corners those of each sheet are few. Chance, and curved sheets, hardly ever put samples so.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import dots, row_dots, unit
+from ..parallel import in_order
 from .mirrors import Mirrors
-from .planes import neighbourhoods
+from .planes import neighbourhoods, parts_of
 
 _INSIDE = 0.004  # sine by which a sample may rise out of the plane of a neighbour
 _ALIKE = np.cos(0.02)  # cosine between axes of one plane
@@ -18,7 +21,6 @@ _UNLIKE = np.cos(0.1)  # cosine between axes that are worth a change
 _MORE = 2  # neighbours that must share a plane with a sample beyond those that share that of its present axis
 _WEDGE = 0.2  # least sine of the angle between two of them: all of a straight line share any plane along it
 _ROUNDS = 4  # for those that share the planes of others once these are right
-_CHUNK = 1024  # samples
 
 
 def onto_shared_planes(points, spacing, tree: KDTree, mirrors: Mirrors, normals, free):
@@ -30,10 +32,9 @@ def onto_shared_planes(points, spacing, tree: KDTree, mirrors: Mirrors, normals,
     """
     moved = np.zeros(len(points), bool)
     for _ in range(_ROUNDS):
-        rows = np.flatnonzero(free & _offered(mirrors, normals))
         turned, changed = normals.copy(), np.zeros(len(points), bool)
-        for first in range(0, len(rows), _CHUNK):
-            row, axes = _most_shared(rows[first : first + _CHUNK], points, spacing, tree, normals)
+        look = partial(_most_shared, points=points, spacing=spacing, tree=tree, normals=normals)
+        for _, (row, axes) in in_order(look, parts_of(free & _offered(mirrors, normals))):
             turned[row], changed[row] = axes, True
         if not changed.any():
             break
