@@ -23,7 +23,7 @@ from ...field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_
 from ...field.grid import Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...linalg import conjugate_gradients, symmetric
-from ...lookup import is_among, numbered
+from ...lookup import numbered
 from ...progress import Progress
 from ..edges.crossings import Crossings
 from .patches import patches
@@ -200,7 +200,9 @@ def _edges_along(axis, node, near, crossings, grid):
     below = node - node_strides(grid.shape)[axis]
     low = np.concatenate([node, below[~at_nodes(near, below)]])
     changing, along = np.divmod(crossings.changing_sides, 3)
-    return _Edges(low, axis, is_among(low, changing[along == axis]), grid)
+    crossed = each(np.zeros_like, near)
+    put(crossed, changing[along == axis], True)
+    return _Edges(low, axis, at_nodes(crossed, low), grid)
 
 
 def _judged(inside, edges):

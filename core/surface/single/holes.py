@@ -126,7 +126,8 @@ def _covered(mesh, triangle, loop, loops, cell):
         return np.zeros(loops)
     middle = mesh.vertices[triangle[large]].mean(axis=1)
     a, b, c = at_corners(mesh.vertices, mesh.faces)
-    row = KDTree(((a + b + c) / 3).T).query(middle, range(1, 1 + min(_AROUND, len(mesh.faces))), workers=-1)[1]
+    tree = KDTree(((a + b + c) / 3).T, balanced_tree=False, compact_nodes=False)  # quick to make, for a few queries
+    row = tree.query(middle, range(1, 1 + min(_AROUND, len(mesh.faces))), workers=-1)[1]
     a, b, c = (corner[:, row] - middle.T[:, :, None] for corner in (a, b, c))
     normal = cross(b - a, c - a)
     size = np.maximum(np.sqrt(dots(normal, normal)), _TINY)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...linalg import cross, dots, lengths, symmetric
+from ...parts import connected_parts
 from ..mesh import Mesh, at_corners
 from ..signs.spreading import spread_signs, spread_strongest
 
@@ -49,7 +50,9 @@ def _beside_lines(mesh):
 def _spread(relation, pair, normal, beside):
     """Signs of the faces, (f,), and the number of the patch of each, (f,), from the `relation` -1 or 1 (p,) of the two
     faces of a `pair` (2,p), first of smooth ones that are not `beside` lines, (f,) bool, then between the parts that
-    this leaves, by the smoothest."""
+    this leaves, by the smoothest. Where all are wound alike that makes every sign 1."""
+    if (relation > 0).all():
+        return np.ones(normal.shape[1]), connected_parts(*pair, normal.shape[1])
     unit = normal / np.maximum(lengths(normal), np.finfo(float).tiny)
     cosine = relation * dots(*(unit.take(face, axis=1) for face in pair))
     smooth = (cosine > _SMOOTH) & ~beside[pair].any(axis=0)
