@@ -38,6 +38,7 @@ class Mesh:
 
     @cached_property
     def edges(self) -> Edges:
+        """Those of its faces, as triangles."""
         return Edges(self.faces, len(self.vertices))
 
     @cached_property
