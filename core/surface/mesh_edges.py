@@ -6,6 +6,8 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from ..linalg import symmetric
+
 
 @dataclass(frozen=True, eq=False)
 class Edges:
@@ -58,6 +60,10 @@ class Edges:
     def ends_at(self, chosen: np.ndarray) -> np.ndarray:
         """How many edges of those `chosen`, (e,) bool, each vertex has, (n,) int."""
         return np.bincount(np.append(self.low[chosen], self.high[chosen]), minlength=self.n)
+
+    def links(self) -> csr_matrix:
+        """Ones where an edge joins two vertices, (n,n) sparse and symmetric."""
+        return symmetric(np.ones(len(self.low)), self.low, self.high, self.n)
 
     def faces_between(self, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
         """How many faces there are at an edge between vertices `tail` and `head`, of one shape; 0 where is none."""

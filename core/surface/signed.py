@@ -5,7 +5,6 @@ already and only their sides are missing (see :mod:`.signs.sides`).
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix
 
 from ..errors import InputError
 from ..field.blocks import Blocks, each
@@ -66,10 +65,7 @@ def signed_mesh(values, passing: np.ndarray, surface: LocalSurface, grid: Grid, 
 
 def _relax(mesh, loose):
     """Move the vertices `loose` of the mesh, in place, towards the middle of their neighbours."""
-    edges, _ = mesh.edge_counts()
-    tail, head = np.concatenate([edges, edges[:, ::-1]]).T
-    n = len(mesh.vertices)
-    links = coo_matrix((np.ones(len(tail)), (tail, head)), shape=(n, n)).tocsr()[loose]
+    links = mesh.edges.links()[loose]
     count = np.asarray(links.sum(axis=1))
     for _ in range(_SMOOTHING):
         mesh.vertices[loose] = (links @ mesh.vertices) / count

@@ -6,7 +6,6 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import symmetric
 from ..mesh_edges import Edges
 
 _BESIDE = 2.0  # levels from an opening that is shut, within which vertices on rims span it, too
@@ -52,8 +51,7 @@ def spanned(vertices: np.ndarray, faces: np.ndarray, loose: np.ndarray) -> np.nd
     if not len(free):
         return moved
     n = len(vertices)
-    edges = Edges(faces, n)
-    links = symmetric(np.ones(len(edges.low)), edges.low, edges.high, n)
+    links = Edges(faces, n).links()
     row = np.flatnonzero(loose | (links @ loose.astype(float) > 0))
     links = links[row]
     links.data /= np.repeat(np.diff(links.indptr), np.diff(links.indptr))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...linalg import row_dots, symmetric
+from ...linalg import row_dots
 from ..mesh import vertex_normals
 from ..mesh_edges import Edges
 
@@ -17,12 +17,10 @@ def evened(vertices: np.ndarray, faces: np.ndarray, fixed: np.ndarray | bool = F
     Vertices marked in `fixed`, (v,) bool, stay, and so do those of edges without exactly two faces and where the
     surface bends within a face or two, at creases for instance.
     """
-    n = len(vertices)
-    edges = Edges(faces, n)
+    edges = Edges(faces, len(vertices))
     normal, least = vertex_normals(vertices, faces)
     free = np.flatnonzero(~fixed & (least >= FLAT) & (edges.ends_at(edges.count != 2) == 0))
-    links = symmetric(np.ones(len(edges.low)), edges.low, edges.high, n)
-    links, normal, moved = links[free], normal[free], vertices.copy()
+    links, normal, moved = edges.links()[free], normal[free], vertices.copy()
     links.data /= np.repeat(np.diff(links.indptr), np.diff(links.indptr))
     here = moved[free]
     for _ in range(_ROUNDS):

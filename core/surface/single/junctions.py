@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...field.local_surface import LocalSurface
-from ...linalg import row_dots, symmetric
+from ...linalg import row_dots
 from ..edges.sheets import STEEP, Sheets, sheets_near
 from ..mesh import Mesh
 from ..meshing.planes import to_planes
@@ -23,7 +23,7 @@ def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None
     line = np.unique(edges[count > 2])
     if not len(line):
         return mesh
-    around, towards = _around(edges, line, len(mesh.vertices))
+    around, towards = _around(mesh.edges.links(), line)
     vertices = mesh.vertices.copy()
     sheets = sheets_near(surface, vertices[np.append(line, around)], towards, cell, progress)
     sheets = sheets[(np.abs(sheets.tau) <= _NEAR * cell) & (sheets.node < len(line))]
@@ -34,11 +34,10 @@ def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None
     return mesh.moved(vertices)
 
 
-def _around(edges, line, n):
-    """The vertices at most three edges (e,2) from those of `line` (l,), without these, (a,), and, as arrays (l + a,)
-    for both, a vertex of the line that each is so close to, by its place in `line`, -1 where there is no further one.
-    """
-    links = symmetric(np.ones(len(edges)), *edges.T, n)
+def _around(links, line):
+    """The vertices at most three edges from those of `line` (l,), by the `links` of all, without these, (a,), and, as
+    arrays (l + a,) for both, a vertex of the line that each is so close to, by its place in `line`, -1 where there is
+    no further one."""
     reach = links[line]
     for _ in range(_RINGS - 1):
         reach = reach @ links + reach

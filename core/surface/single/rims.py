@@ -72,8 +72,7 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
 
     moved = vertices - mesh.vertices
     rows = _ROWS + int(np.ceil(_STRETCH * np.percentile(np.linalg.norm(moved[loop], axis=1), _MOST) / cell))
-    graph = coo_matrix((np.ones(len(edges)), tuple(edges.T)), shape=(n, n)).tocsr()
-    graph = graph + graph.T
+    graph = mesh.edges.links()
     row = np.flatnonzero(_grown(ends > 0, graph, rows) & ~_grown(fixed, graph, _CLEAR) & (ends == 0))
     if not len(row):
         return mesh.moved(vertices)

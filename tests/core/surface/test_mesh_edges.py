@@ -50,6 +50,13 @@ def test_ends_are_counted_at_vertices(faces):
         assert edges.ends_at(edges.count == times).tolist() == [ends.count(vertex) for vertex in range(12)]
 
 
+def test_links_join_both_ends_of_every_edge_once(faces):
+    edges = Edges(faces, 12)
+    expected = np.zeros((12, 12))
+    expected[edges.low, edges.high] = expected[edges.high, edges.low] = 1
+    np.testing.assert_array_equal(edges.links().toarray(), expected)
+
+
 def test_no_faces():
     edges = Edges(np.empty((0, 3), np.int32), 0)
     assert [len(x) for x in (edges.low, edges.high, edges.count, edges.number, *edges.beside, edges.alike)] == [0] * 7
