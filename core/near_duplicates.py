@@ -3,7 +3,9 @@ unwelded triangles.
 
 Bisectors of two such points tell nothing of the surface, and neighbourhoods that are full of them reach no further than
 the next few places. In a random cloud the points with another within a share q of the spacing grow as q^2, or as q
-along lines, so within q there are few of those within 4 q; of copies there are nearly all.
+along lines, so within q there are few of those within 4 q; of copies there are nearly all. So it is with small parts
+far apart, too, whose points have most of their 16 nearest in others; but those parts are more than the few copies that
+there are of a point which was not given in much the same place.
 """
 
 import numpy as np
@@ -11,8 +13,10 @@ from scipy.spatial import KDTree
 
 from .parts import connected_parts
 from .progress import Progress
+from .spatial_order import spatial_order
 
 _CLOSE = 0.01, 0.05, 0.1  # local spacings, within which most copies may lie
+_MANY, _COPIES = 0.01, 7  # the same, within which there may be many of a point; in the median, at most, beyond
 _WIDER, _MOST = 4.0, 0.7  # of the points with another within 4 times as far, the least share that has one within it
 _LEAST, _FEWEST = 0.01, 8  # and if this share of all points has, and so many; of random ones .008 within a twentieth
 _MERGED = 2.0  # times as far, the other copies may lie
@@ -33,7 +37,10 @@ def find_near_duplicates(points: np.ndarray, progress=None) -> np.ndarray:
         close = _closeness(tree)
         if close is None:
             break
-        kept = kept[_first_of_clusters(tree, _MERGED * close, progress)]
+        places = _first_of_clusters(tree, _MERGED * close, progress)
+        if len(places) <= _NEIGHBOURS:  # so few that the spacing was that between their copies
+            break
+        kept = kept[places]
     copies = np.ones(len(points), bool)
     copies[kept] = False
     return copies
@@ -41,12 +48,16 @@ def find_near_duplicates(points: np.ndarray, progress=None) -> np.ndarray:
 
 def _closeness(tree):
     """Local spacings within which most copies lie, None where there are none."""
-    tried = np.linspace(0, tree.n - 1, min(_TRIED, tree.n)).astype(np.int64)
+    tried = np.arange(tree.n)
+    if tree.n > _TRIED:
+        tried = spatial_order(tree.data)[np.linspace(0, tree.n - 1, _TRIED).astype(np.int64)]
     distance, _, spacing = _neighbours(tree, tried)
-    nearest = distance[:, 1] / spacing
+    distance = distance / spacing[:, None]
     for close in _CLOSE:
-        paired, around = (nearest < close).sum(), (nearest < _WIDER * close).sum()
-        if paired >= max(_FEWEST, _LEAST * len(tried), _MOST * around):
+        paired, around = distance[:, 1] < close, distance < _WIDER * close
+        if paired.sum() < max(_FEWEST, _LEAST * len(tried), _MOST * around[:, 1].sum()):
+            continue
+        if close <= _MANY or np.median(around[paired].sum(axis=1)) <= _COPIES:
             return close
     return None
 

@@ -63,6 +63,35 @@ def test_many_copies_of_each():
     assert found[: len(SCATTERED)].mean() < 0.04
 
 
+def _cubes(count, apart):
+    corners = np.indices((2, 2, 2)).reshape(3, -1).T.astype(float)
+    return (apart * np.indices((count, count, 1)).reshape(3, -1).T[:, None] + corners).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("apart", [20, 24, 30, 50, 1000])
+def test_points_of_a_few_small_parts_far_apart_are_no_copies(apart):
+    assert not find_near_duplicates(_cubes(2, apart)).any()
+
+
+@pytest.mark.parametrize("apart", [20, 24, 30, 50])
+def test_points_of_many_small_parts_far_apart_are_no_copies(apart):
+    rng = np.random.default_rng(7)
+    parts = 2 * rng.random((36, 10, 3)) + apart * np.indices((6, 6, 1)).reshape(3, -1).T[:, None]
+    assert not find_near_duplicates(_cubes(6, apart)).any()
+    assert not find_near_duplicates(parts.reshape(-1, 3)).any()
+
+
+def test_copies_are_found_in_any_order():
+    """Those of two scanners that took turns, too, where every other row of many is looked at."""
+    points = shapes.scattered_sphere(8192)
+    points[1::4] = points[3::4] + 1e-9
+    found = find_near_duplicates(points)
+    assert found[3::4].all()
+    assert found.mean() < 0.26
+    order = np.random.default_rng(8).permutation(len(points))
+    assert find_near_duplicates(points[order]).sum() == found.sum()
+
+
 def test_a_part_that_is_there_twice():
     torus = _random_torus(4000)
     twice = np.flatnonzero(torus[:, 0] > 0)
