@@ -24,7 +24,7 @@ def poisson(
     Minimises the squared difference between the slope of u along every edge of the grid of every second node and the
     fused directions Y_f there, with u held softly at the known distances, by conjugate gradients preconditioned with
     the cosine transform of the Laplacian. Departs from the paper in the anchor: u = 0 at points off the grid alone is
-    slow to solve and no more accurate. Nowhere is the distance more than that to the nearest sample.
+    slow to solve and no more accurate. At none of those nodes is the distance more than that to the nearest sample.
 
     diffusion : where the directions come from. "kernel": projections onto the surface, which ends at rims; "grid": the
     paper's diffusion on the grid of all nodes, which knows no rims
@@ -32,6 +32,9 @@ def poisson(
     Raises :class:`SettingsError` where that grid or float64 cannot hold the diffusion.
     """
     progress = Progress.of(progress)
+    shape = grid.shape
+    known = np.pad(known, [(0, (1 - nodes) % STRIDE) for nodes in shape], constant_values=np.nan)
+    grid = Grid(grid.origin, grid.spacing, known.shape)  # up to a coarse node on every side
     known = known[::STRIDE, ::STRIDE, ::STRIDE]
     coarse = Grid(grid.origin, STRIDE * grid.spacing, known.shape)
     nodes = coarse.positions(np.arange(known.size))
@@ -50,7 +53,7 @@ def poisson(
     right = anchor * np.nan_to_num(known) - _divergence(direction)
     solution = _solve(anchor, right, start.reshape(known.shape), progress.part(0.5, 1.0))
     solution = np.clip(solution, 0, farthest.reshape(known.shape))
-    at = np.indices(grid.shape, np.float32) / STRIDE
+    at = np.indices(shape, np.float32) / STRIDE
     return map_coordinates(solution, at, order=1, mode="nearest", output=np.float32)
 
 
