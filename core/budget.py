@@ -97,10 +97,10 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
         band = _fitting_band(len(spacing), area, limit, settings)
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
-    elif len(spacing) <= (fitting := _fitting_samples(limit, settings)):
-        remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
-    elif fitting >= MINIMUM_SAMPLES:
+    elif len(spacing) > (fitting := _fitting_samples(limit, settings)) >= MINIMUM_SAMPLES:
         remedy = f"thin the {len(spacing)} points to {fitting} or fewer, or raise memory_limit"
+    elif _memory_at(options()["resolution"].metadata["limits"][0], len(spacing), area, grid, settings) <= limit:
+        remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
     else:
         remedy = "raise memory_limit"
     raise MemoryBudgetError(

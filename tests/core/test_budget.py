@@ -89,6 +89,15 @@ def test_a_grid_without_room_for_the_offset_is_not_advised():
             check_budget(estimate_cost(spacing, grid, settings), spacing, grid, settings)
 
 
+@pytest.mark.parametrize(("band", "offset"), [(4, 1.0), (4, 0.5), (None, 1.0)])
+def test_a_lower_offset_is_not_advised_where_it_does_not_help(band, offset):
+    """What is too much is what a run takes at any resolution."""
+    _, grid = cost(POINTS, 48)
+    settings = Settings(resolution=48, band=band, offset=offset, memory_limit=64)
+    with pytest.raises(MemoryBudgetError, match=r"may be used; raise memory_limit$"):
+        check_budget(Estimate(1.0, 126.0, 1.0), np.full(300, 0.3), grid, settings)
+
+
 def test_noise_costs(monkeypatch):
     """On a machine of one speed: the probe of two estimates may differ by a third on a busy one."""
     monkeypatch.setattr("core.budget._probe", lambda: (0.004, 1.0))
