@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..field.blocks import Blocks
-from ..field.grid import Grid
+from ..field.grid import Grid, padding_cells
 from ..field.local_surface import LocalSurface
 from ..field.steps import NearBand
 from ..progress import Progress
@@ -50,9 +50,15 @@ def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     needed = settings.band
     if settings.surface in _WITH_SIDES or (settings.surface == "double" and local.spacing_in_cells(grid) <= SPARSEST):
         needed = max(needed, needed_band(local, grid))
-    if settings.surface in ("double", "both", "single"):
-        needed = max(needed, level_for(local, grid, settings.offset) + CLAMP)
+    if settings.surface != "none":
+        needed = max(needed, level_for(local, grid, _offset(settings)) + CLAMP)
     return needed
+
+
+def _offset(settings):
+    """Cells off the surface at which a double cover is extracted; of a signed surface, which hardly needs it, no more
+    than the box has room for."""
+    return min(settings.offset, padding_cells(settings.resolution))
 
 
 def _said_of_torn(local, grid):
@@ -97,7 +103,7 @@ def extract_surfaces(
     meshes, dropped, warnings = {}, {}, []
     if settings.faces == "quads" and kind != "none":
         need_quads()
-    choice = Choice(values, band, local, grid, settings.offset, progress)
+    choice = Choice(values, band, local, grid, _offset(settings), progress)
     if kind in ("double", "both"):
         meshes["double"] = choice.cover
         if (missed := choice.cover_fit[1]) > _SOME:

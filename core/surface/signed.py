@@ -87,4 +87,4 @@ def _refusal(sides, surface, place):
 
 
 def _text(position):
-    return "({:.6g}, {:.6g}, {:.6g})".format(*position)
+    return "({:.9g}, {:.9g}, {:.9g})".format(*position)

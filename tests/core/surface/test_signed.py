@@ -100,6 +100,22 @@ def test_vertices_lie_on_the_surface(runs, name, hair):
     assert off.max() < hair
 
 
+def test_an_offset_that_the_box_has_no_room_for_does_not_matter():
+    """A flat ellipsoid, where the double cover is looked at, too."""
+    run = signed(shapes.sphere(480) * [1, 1, 0.12], resolution=32, offset=4)
+    assert set(run.surface.edge_counts()[1]) == {2}
+    assert shapes.signed_volume(run.surface) == pytest.approx(0.12 * 4 / 3 * np.pi, rel=0.15)
+
+
+def test_places_are_told_far_from_the_origin():
+    """Of a map's coordinates six digits are kilometres."""
+    points = shapes.hemisphere(1500) + np.array([500_000, 5_400_123.4, 100])
+    with pytest.raises(InputError, match="not closed") as told:
+        signed(points)
+    place = np.array(str(told.value).split("near (")[1].split(")")[0].split(","), float)
+    assert np.linalg.norm(points - place, axis=1).min() < 1e-2
+
+
 @pytest.mark.parametrize("shape", ["hemisphere", "disc", "cylinder", "moebius", "junction"])
 def test_an_open_shape_is_refused_with_the_reason_and_a_place(shape):
     points = getattr(shapes, shape)(1500) * 10 + 100
