@@ -51,14 +51,16 @@ def fix(obj: bpy.types.Object, axes) -> int:
 
 def of_active(obj: bpy.types.Object) -> np.ndarray:
     """Axis (3,) that the active element of the mesh `obj`, in edit mode, stands for: the normal of a face, the
-    direction of an edge, the fixed axis of a vertex. Raises :class:`InputError` where there is none."""
+    direction of an edge, the fixed axis of a vertex; in the object's space, where it turns with the object as a normal
+    does, unlike an edge if the object is stretched. Raises :class:`InputError` where there is none."""
     mesh = bmesh.from_edit_mesh(obj.data)
     active, layer = mesh.select_history.active, mesh.verts.layers.float_vector.get(AXIS)
     axis = np.zeros(3)
     if isinstance(active, bmesh.types.BMFace):
         axis = np.array(active.normal)
     elif isinstance(active, bmesh.types.BMEdge):
-        axis = np.array(active.verts[1].co - active.verts[0].co)
+        matrix = np.array(obj.matrix_world, np.float64)[:3, :3]
+        axis = matrix @ np.array(active.verts[1].co - active.verts[0].co) @ matrix
     elif active is not None and layer is not None:
         axis = np.array(active[layer])
     if not axis.any():

@@ -234,6 +234,19 @@ def test_axes_of_the_active_element(blender, extension, edited):
     assert_allclose(np.abs(axes), [[0, 1, 0]] * 4, atol=1e-6)
 
 
+def test_an_active_edge_gives_its_direction_though_the_object_is_stretched(blender, extension, edited):
+    import bmesh
+
+    mesh = bmesh.from_edit_mesh(edited.data)
+    mesh.verts.ensure_lookup_table()
+    edge = mesh.edges.new(mesh.verts[0:2])
+    mesh.select_history.add(edge)
+    blender.ops.vad.fix_axes(origin="ACTIVE")
+    _, axes = constraints(blender, extension)
+    way = edited.matrix_world.to_3x3() @ (edge.verts[1].co - edge.verts[0].co)
+    assert_allclose(np.abs(axes @ np.array(way.normalized())), 1, atol=1e-6)
+
+
 def test_freed_axes_are_gone(blender, extension, edited):
     blender.ops.vad.fix_axes(origin="TYPED")
     blender.ops.vad.free_axes()
