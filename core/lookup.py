@@ -21,3 +21,16 @@ def numbered(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first of each as well, NumPy sorts by merging, which is quick on runs."""
     distinct, _, number = np.unique(keys, return_index=True, return_inverse=True)
     return distinct, number.reshape(keys.shape)
+
+
+def least_of_each(keys: np.ndarray, *costs: np.ndarray) -> np.ndarray:
+    """Of each distinct one of some keys (n,) from 0 on, ascending, the row where the costs (n,) are least, the first
+    cost before the next ones; the first row of equals."""
+    order = np.lexsort((*costs[::-1], keys))
+    return order[np.diff(keys[order], prepend=-1) > 0]
+
+
+def edge_keys(edges: np.ndarray, n: int) -> np.ndarray:
+    """One number for each undirected edge between n vertices, (e,2) -> (e,) int64."""
+    a, b = edges.astype(np.int64).T
+    return np.minimum(a, b) * n + np.maximum(a, b)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import label
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+
+from ..parts import connected_parts
 
 SIDE = 8
 _NODES = SIDE**3
@@ -211,10 +211,7 @@ def regions(mask: "np.ndarray | Blocks") -> tuple["np.ndarray | Blocks", int]:
     outer, more = label(mask.outer & (mask.slot < 0))
     outer[outer > 0] += sets
     links = np.concatenate([_meeting(mask.slot, within, outer, axis) for axis in range(3)], axis=1)
-    graph = coo_matrix((np.ones(links.shape[1], bool), links), shape=(sets + more + 1,) * 2)
-    joined = connected_components(graph, directed=False)[1]  # label 0 stays alone, hence 0
-    names = np.unique(joined[1:], return_inverse=True)[1].reshape(-1) if sets + more else np.empty(0, np.int64)
-    names = np.concatenate([[0], names + 1]).astype(np.int32)
+    names = connected_parts(*links, sets + more + 1)  # label 0 stays alone, hence 0
     return replace(mask, stored=names[within], outer=names[outer]), int(names.max())
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..field.blocks import node_gradient
 from ..field.distance_field import BandedField
+from ..linalg import unit
 from ..reconstruction import Reconstruction
 from .atomic import atomic_path
 
@@ -32,7 +33,6 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
     Raises :class:`VADError` where the file cannot be written whole.
     """
     field, near = result.field, result.field.near
-    length = np.linalg.norm(near.step, axis=1, keepdims=True)
     node = np.stack(np.unravel_index(near.node, field.shape), axis=1)
     if isinstance(field, BandedField):
         gradient = node_gradient(field.blocks, field.spacing).stored
@@ -49,6 +49,6 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
             signed=field.sdf,
             gradient=gradient,
             node=node.astype(np.int32),
-            direction=(near.step / np.where(length > 0, length, 1.0)).astype(np.float32),
+            direction=unit(near.step).astype(np.float32),
             foot=field.origin + field.spacing * node - near.step,
         )

@@ -143,8 +143,8 @@ class Choice:
         if self.single.of_sides is not None:
             return self.single.sides.complete or not self.meetings.pass_through
         sheet = self.single.sheet[0]
-        edges, count = sheet.edge_counts()
-        border, line = (np.unique(edges[some]) for some in (count == 1, count > 2))
+        edges, count = sheet.edges, sheet.edges.count
+        border, line = (np.flatnonzero(edges.ends_at(some)) for some in (count == 1, count > 2))
         if len(line):
             shown = self.meetings.passing.any() or self._at_meetings(sheet.vertices[line]) >= _SEEN
             return shown and not self.meetings.side_by_side

@@ -1,20 +1,17 @@
 """What the report tells of meshes."""
 
-import numpy as np
+from dataclasses import replace
 
 from ..parallel import in_order
 from ..progress import Progress
 from .extract import Surfaces
-from .mesh import curve_count
-from .mesh_edges import Edges
 from .meshing.pieces import piece_count
 from .meshing.quality import quad_quality, triangle_quality
 
 
 def _edge_facts(mesh):
-    edges = Edges(mesh.faces, len(mesh.vertices))  # those of the mesh itself would stay in memory with it
-    border = np.stack([edges.low, edges.high], axis=1)[edges.count == 1]
-    return {"borders": curve_count(border), "nonmanifold_edges": int((edges.count > 2).sum())}
+    mesh = replace(mesh)  # its edges would stay in memory with it
+    return {"borders": mesh.border_loops(), "nonmanifold_edges": int((mesh.edges.count > 2).sum())}
 
 
 _FACTS = (  # what takes longest first, as they are found side by side

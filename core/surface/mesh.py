@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ..linalg import cross, lengths
+from ..lookup import numbered
 from ..parallel import over_rows
 from ..parts import connected_parts
 from .mesh_edges import Edges
@@ -69,6 +70,17 @@ class Mesh:
         found[: 2 * self.pairs] = np.tile(halves[0] | halves[1], 2)
         return found
 
+    def vertices_of(self, chosen: np.ndarray) -> np.ndarray:
+        """Which vertices faces `chosen`, (f,) bool or rows, have, (v,) bool."""
+        found = np.zeros(len(self.vertices), bool)
+        found[self.faces[chosen]] = True
+        return found
+
+    def faces_at(self, chosen: np.ndarray) -> np.ndarray:
+        """Which faces have a vertex that is `chosen`, (v,) bool, (f,) bool."""
+        first, second, third = (chosen[corner] for corner in self.faces.T)
+        return first | second | third
+
     def part(self, kept: np.ndarray) -> "Mesh":
         """The mesh of the faces marked in `kept`, as :meth:`of_faces`, with their vertices alone."""
         mesh = self.of_faces(kept)
@@ -101,24 +113,18 @@ class Mesh:
     def border_loops(self) -> int:
         """Number of connected curves that the border edges (those of one face) form."""
         edges, counts = self.edge_counts()
-        return curve_count(edges[counts == 1])
+        corners, ends = numbered(edges[counts == 1])
+        return int(connected_parts(*ends.T, len(corners)).max(initial=-1)) + 1
 
     def face_areas(self) -> np.ndarray:
         """(f,) float64, square input units."""
         columns, found = np.asfortranarray(self.vertices), np.empty(len(self.faces))
 
         def measure(part):
-            a, b, c = at_corners(columns, self.faces[part])
-            found[part] = 0.5 * lengths(cross(b - a, c - a))
+            found[part] = 0.5 * lengths(face_normals(*at_corners(columns, self.faces[part])))
 
         over_rows(measure, len(self.faces), AT_ONCE)
         return found
-
-
-def curve_count(edges: np.ndarray) -> int:
-    """Number of connected curves that edges (e,2) form."""
-    corners, ends = np.unique(edges, return_inverse=True)
-    return int(connected_parts(*ends.reshape(-1, 2).T, len(corners)).max(initial=-1)) + 1
 
 
 def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
@@ -128,6 +134,11 @@ def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
         for row, column in zip(place, np.ascontiguousarray(x.T), strict=True):
             np.take(column, corner, out=row, mode="clip")  # which writes there at once, as "raise" does not
     return list(found)
+
+
+def face_normals(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Normals (3,...) of triangles with corners (3,...) each, twice as long as their areas."""
+    return cross(b - a, c - a)
 
 
 def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -58,7 +58,7 @@ class Edges:
         return np.bincount(self.number.reshape(-1), upwards.reshape(-1))[self.count == 2] == 1
 
     def ends_at(self, chosen: np.ndarray) -> np.ndarray:
-        """How many edges of those `chosen`, (e,) bool, each vertex has, (n,) int."""
+        """How many edges of those `chosen`, (e,) bool or rows, each vertex has, (n,) int."""
         return np.bincount(np.append(self.low[chosen], self.high[chosen]), minlength=self.n)
 
     def links(self) -> csr_matrix:

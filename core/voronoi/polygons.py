@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..linalg import row_dots
+from ..linalg import row_dots, tangent_frames
 from ..lookup import rows_of
 from .facets import Facets, by_blocks, clip_radius, facets_of, inside_ball, joined
 
@@ -91,9 +91,8 @@ class _Frame:
         i, j = facets.pairs.T
         axis = points[j] - points[i]
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        e1 = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
-        e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
-        return cls(0.5 * (points[i] + points[j]), e1, np.cross(axis, e1), clip_radius(spacing, i, j))
+        e1, e2 = tangent_frames(axis).transpose(1, 0, 2)
+        return cls(0.5 * (points[i] + points[j]), e1, e2, clip_radius(spacing, i, j))
 
     def angle(self, vectors, facet):
         return np.arctan2(row_dots(vectors, self.e2[facet]), row_dots(vectors, self.e1[facet]))

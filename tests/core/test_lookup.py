@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.lookup import is_among, numbered, rows_of
+from core.lookup import edge_keys, is_among, least_of_each, numbered, rows_of
 
 NUMBERS = arrays(np.int64, st.integers(0, 30), elements=st.integers(-5, 20))
 
@@ -32,3 +32,18 @@ def test_distinct_numbers_in_order_and_which_each_is(keys):
     distinct, number = numbered(keys)
     assert distinct.tolist() == sorted(set(keys.tolist()))
     assert distinct[number].tolist() == keys.tolist()
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 2), st.integers(-2, 2)), max_size=30))
+def test_the_least_of_each_key_is_the_first_by_its_costs(rows):
+    keys, first, second = np.array(rows, np.int64).reshape(-1, 3).T
+    found = least_of_each(keys, first, second)
+    ordered = sorted(range(len(rows)), key=lambda row: rows[row])
+    assert found.tolist() == [next(row for row in ordered if rows[row][0] == key) for key in sorted(set(keys.tolist()))]
+
+
+def test_edges_have_one_key_either_way():
+    edges = np.array([[0, 1], [1, 0], [0, 2], [1, 2]], np.int32)
+    first, again, *others = edge_keys(edges, 3).tolist()
+    assert first == again
+    assert len({first, *others}) == 3

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...linalg import row_dots
+from ...lookup import least_of_each
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
@@ -83,9 +84,8 @@ def find_rim_gaps(row, outward, usual, at_random, cloud: Cloud, progress=None) -
     chunks = Progress.of(progress).chunks(len(random), _CHUNK)
     found = [gaps for _, gaps in in_order(look, chunks)] or [(np.empty(0, int), np.empty((0, 3)), *np.empty((2, 0)))]
     gap, across, depth, on = (np.concatenate(each) for each in zip(*found, strict=True))
-    order = np.lexsort((depth, -on, gap))
-    order = order[np.diff(gap[order], prepend=-1) > 0]
-    gap, across, depth = gap[order], across[order], depth[order]
+    best = least_of_each(gap, -on, depth)
+    gap, across, depth = gap[best], across[best], depth[best]
     own = normals[row[gap]]
     up = across - row_dots(across, own)[:, None] * own
     up /= np.linalg.norm(up, axis=1, keepdims=True)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...linalg import cross, lengths
-from ..mesh import Mesh, at_corners
+from ...linalg import lengths
+from ..mesh import Mesh, at_corners, face_normals
 from .around_edges import corner_after, order_around
 from .layers import HAIR
 
@@ -33,8 +33,8 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
     place = np.empty(sides.vertex.max(initial=-1) + 1, sheet.faces.dtype)
     place[sides.vertex] = sheet.faces
     vertices = np.concatenate([sheet.vertices[place], sheet.vertices[sides.halved].mean(axis=0)])
-    a, b, c = at_corners(sheet.vertices, sheet.faces)
-    normal = np.stack([_totals(x, sides, len(vertices)) for x in cross(b - a, c - a)])
+    faces = face_normals(*at_corners(sheet.vertices, sheet.faces))
+    normal = np.stack([_totals(x, sides, len(vertices)) for x in faces])
     size = lengths(normal)
     normal *= 0.5 * HAIR * cell / np.where(size > 0, size, 1.0)  # at borders both sides cancel
     return _joined(vertices + normal.T, sides, sheet.pairs)

@@ -7,7 +7,7 @@ from ...field.blocks import each
 from ...field.grid import Grid, padding_cells
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
-from ...linalg import shortened
+from ...linalg import shortened, unit
 from ...lookup import rows_of
 from ...progress import Progress
 from ..edges.first_steps import first_steps
@@ -95,7 +95,7 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
         found = _extracted(clamped, level, band, surface, grid, progress.part(0.15, 0.3), found)
     vertices, faces, step, past_rim = found
     loose = spanning_vertices(vertices, step, past_rim, shut, level)
-    side = np.where((past_rim | loose)[:, None], 0.0, step / np.maximum(_length(step), np.finfo(float).tiny))
+    side = np.where((past_rim | loose)[:, None], 0.0, unit(step))
     vertices = evened(_moved(vertices, step, level), faces, past_rim)
     vertices = _moved(vertices, surface.project(vertices, progress.part(0.3, 0.7)).step, level)
     vertices = into_corners(vertices, faces, side, surface, grid.spacing, progress.part(0.7, 0.8))
@@ -137,7 +137,3 @@ def _shared(vertices, others):
 def _moved(vertices, step, level):
     """The vertices less the steps, shortened where they are very long."""
     return vertices - shortened(step, _LONGEST_STEP * level)
-
-
-def _length(step):
-    return np.linalg.norm(step, axis=1, keepdims=True)

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from ...linalg import cross, dots, lengths, unit
 from ...parallel import work_through
 from ...progress import Progress
-from ..mesh import Mesh, at_corners
+from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.centring import Bend, bend_of
 
 HAIR = 3e-4  # cells, between the layers
@@ -39,9 +39,9 @@ def laid_apart(mesh: Mesh, cell: float, progress=None) -> Mesh:
 
 
 def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
-    beside = np.zeros(len(mesh.vertices), bool)
-    beside[mesh.faces[bend.sharp[mesh.faces].any(axis=1)]] = True
-    ends = np.concatenate([np.tile(np.arange(len(beside))[:, None], 2), bend.edges[beside[bend.edges].all(axis=1)]]).T
+    beside = mesh.vertices_of(mesh.faces_at(bend.sharp))
+    edges = np.stack([mesh.edges.low, mesh.edges.high])
+    ends = np.concatenate([np.tile(np.arange(len(beside)), (2, 1)), edges[:, beside[edges].all(axis=0)]], axis=1)
     place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
     outward = unit(outward)
     behind, face = _other_layer(mesh, place, outward, cell, progress)
@@ -59,7 +59,7 @@ def _other_layer(mesh, place, outward, cell, progress):
     if not len(place):
         return behind, which
     corners = at_corners(mesh.vertices, mesh.faces)
-    normal = cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal = face_normals(*corners)
     normal /= np.maximum(lengths(normal), _SLIVER * cell**2)
     held = sum(corners) / 3 - _SHIFT * cell * normal
     progress(0.0)

@@ -15,10 +15,9 @@ from ...field.blocks import SIDE, Blocks, at_nodes, block_corners, each, inner_n
 from ...field.grid import Grid, node_strides
 from ...field.groups import HALF, middles_of
 from ...field.local_surface import LocalSurface
-from ...lookup import rows_of
+from ...lookup import edge_keys, rows_of
 from ...parallel import over_rows
 from ...progress import Progress
-from ..meshing.fillings import edge_keys
 from ..signs.patches import patches
 from ..signs.sides import regions_beside
 

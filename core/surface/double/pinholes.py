@@ -11,11 +11,10 @@ import numpy as np
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import dots, row_dots
-from ...lookup import numbered
+from ...lookup import edge_keys, numbered
 from ...parallel import over_rows
 from ...parts import connected_parts
 from ..mesh import AT_ONCE, at_corners
-from ..meshing.fillings import edge_keys
 
 _LONGEST = 64  # faces of a loop; longer ones go around sheets and wide holes
 _LEVEL = 0.5  # least mean cosine between their normals and that of an opening in their sheet

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from ...field.blocks import Blocks, at_nodes, put
 from ...field.grid import Grid
 from ...field.steps import NearBand
-from ...linalg import dots
+from ...linalg import dots, unit
 from ...parallel import in_order
 from ..signs.patches import patches
 
@@ -57,7 +57,7 @@ def ridge_share(band: NearBand) -> float:
 
 def _directions(band):
     """Unit directions from the surface to the nodes of the band, (3,b)."""
-    return (band.step / np.maximum(np.linalg.norm(band.step, axis=1), np.finfo(float).tiny)[:, None]).T
+    return unit(band.step).T
 
 
 def _averaged(height, place, reach):

@@ -38,9 +38,7 @@ def stretched_vertices(vertices, faces, surface: LocalSurface, cell: float) -> n
     far = np.flatnonzero(((vertices[tail] - vertices[head]) ** 2).sum(axis=1) > (_STRETCHED * cell) ** 2)
     middle = 0.5 * (vertices[tail[far]] + vertices[head[far]])
     far = far[surface.project(middle).distance > _OFF * cell]
-    found = np.zeros(len(vertices), bool)
-    found[tail[far]] = found[head[far]] = True
-    return found
+    return edges.ends_at(far) > 0
 
 
 def spanned(vertices: np.ndarray, faces: np.ndarray, loose: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from ...field.grid import CORNERS, Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import COMPONENTS, dots, principal_axes
-from ...lookup import numbered
+from ...lookup import least_of_each, numbered
 from ...parallel import even_chunks, in_order
 from ...progress import Progress
 from .first_steps import first_steps
@@ -147,8 +147,7 @@ def _once(meet):
     edges that several cross."""
     edge, index = numbered(meet.edge)
     several = np.bincount(index, meet.crossed, len(edge))[index] > 1
-    order = np.lexsort([meet.certainty, ~meet.crossed, index])
-    best = order[np.diff(index[order], prepend=-1) > 0]
+    best = least_of_each(index, ~meet.crossed, meet.certainty)
     return best[~several[best]], np.flatnonzero(several & meet.crossed)
 
 

@@ -8,6 +8,7 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import row_dots
+from ...lookup import least_of_each
 from ...parallel import in_order
 from ...progress import Progress
 from .meetings import Meetings
@@ -96,8 +97,8 @@ def _along(axis, ahead, sheets, x, cell, hair):
 
 def _least(key, cost):
     """Whether each line has the least cost of those with its key, (e,) bool; the first of equals."""
-    order, chosen = np.lexsort((cost, key)), np.zeros(len(key), bool)
-    chosen[order[np.diff(key[order], prepend=-1) > 0]] = True
+    chosen = np.zeros(len(key), bool)
+    chosen[least_of_each(key, cost)] = True
     return chosen
 
 

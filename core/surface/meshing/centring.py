@@ -35,14 +35,13 @@ def centred(mesh: Mesh) -> Mesh:
 class Bend:
     """How the surface bends under the faces of a mesh, as the normals n of its vertices x tell.
 
-    normal : (v,3) float64, unit normals     edges : (e,2), see :meth:`Mesh.edge_counts`
+    normal : (v,3) float64, unit normals
     sharp  : (v,) bool, where the mesh bends within a face or two
     free   : (v,) bool, vertices that may move: neither sharp nor at an edge without exactly two faces wound alike
     turn   : (3,f) float64, (x_j - x_i).(n_j - n_i) of the edges of each face; 0 beside sharp vertices
     """
 
     normal: np.ndarray
-    edges: np.ndarray
     sharp: np.ndarray
     free: np.ndarray
     turn: np.ndarray
@@ -64,10 +63,9 @@ class Bend:
 def bend_of(mesh: Mesh) -> Bend:
     """How the surface bends under the faces of a mesh whose vertices lie on it."""
     vertices, faces = mesh.vertices, mesh.faces
-    (normal, least), (edges, counts) = side_by_side(lambda: mesh.normals, mesh.edge_counts)
+    (normal, least), count = side_by_side(lambda: mesh.normals, lambda: mesh.edges.count)
     sharp = least < FLAT
-    free = ~sharp
-    free[edges[counts != 2]] = False
+    free = ~sharp & (mesh.edges.ends_at(count != 2) == 0)
     columns, turn = (np.asfortranarray(vertices), np.asfortranarray(normal)), np.empty((3, len(faces)))
 
     def look(part):
@@ -77,4 +75,4 @@ def bend_of(mesh: Mesh) -> Bend:
         turn[:, part] *= ~sharp[faces[part]].any(axis=1)
 
     over_rows(look, len(faces), AT_ONCE)
-    return Bend(normal, edges, sharp, free, turn)
+    return Bend(normal, sharp, free, turn)

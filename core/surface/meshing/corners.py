@@ -45,8 +45,7 @@ def into_corners(
     way = vertices[high] - vertices[low]
     concave = row_dots(way, side[low]) > _ABOVE * cell
     concave &= row_dots(way, side[high]) < -_ABOVE * cell
-    row, ends = np.unique(np.stack([low[concave], high[concave]]), return_inverse=True)
-    low, high = ends.reshape(2, -1)
+    row, (low, high) = numbered(np.stack([low[concave], high[concave]]))
     step, off = _to_meetings(
         vertices[row], side[row], np.append(low, high), np.append(high, low), surface, cell, progress
     )

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from ...lookup import edge_keys
+
 _FAIR = 0.1  # weight of the squared sides of a triangle beside its area
 _BOUND, _THERE = 1e2, 1e6  # square cells, what an edge and a face count that the mesh has already
 _CHUNK = 1 << 20  # triples of corners that are weighed at a time
@@ -50,12 +52,6 @@ def _fillings(vertices, loops, edges, faces, cell):
         triangles.append(loop[np.arange(len(number))[:, None, None], found][kept].reshape(-1, 3))
         owners.append(np.repeat(number[kept], size - 2))
     return np.concatenate(triangles), np.concatenate(owners)
-
-
-def edge_keys(edges, n: int) -> np.ndarray:
-    """One number for each undirected edge between n vertices, (e,2) -> (e,) int64."""
-    a, b = edges.astype(np.int64).T
-    return np.minimum(a, b) * n + np.maximum(a, b)
 
 
 def _face_keys(faces, n):

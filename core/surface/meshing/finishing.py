@@ -34,9 +34,7 @@ def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: floa
     for turn, outward in enumerate(turns):
         part = progress.part(turn / len(turns), (turn + 1) / len(turns))
         vertices, (normal, least) = mesh.vertices, mesh.normals
-        beside_bends, side = np.zeros(len(vertices), bool), np.zeros_like(vertices)
-        beside_bends[mesh.faces[(least < FLAT)[mesh.faces].any(axis=1)]] = True
-        row = np.flatnonzero(beside_bends)
+        row, side = np.flatnonzero(mesh.vertices_of(mesh.faces_at(least < FLAT))), np.zeros_like(vertices)
         way = outward * normal[row]
         found = surface.project(vertices[row] + _ASIDE * cell * way, part.part(0.0, 0.5))
         direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots, lengths
-from ..mesh import Mesh, at_corners
+from ...linalg import dots, lengths
+from ..mesh import Mesh, at_corners, face_normals
 
 _TORN = 0.07  # cells, mean distance of the samples to a mesh, above which it is torn
 _ASKEW = 0.1  # of its area, the same where faces are turned away from the samples
@@ -32,7 +32,7 @@ def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray |
     if not len(mesh.faces):
         return np.inf
     a, b, c = at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)])
-    area, off = lengths(cross(b - a, c - a)), surface.project(((a + b + c) / 3).T).distance
+    area, off = lengths(face_normals(a, b, c)), surface.project(((a + b + c) / 3).T).distance
     points, total = surface.points if points is None else points, area.sum()
     return (distances(mesh, points).mean() + off @ area / total) / cell if total else np.inf
 
@@ -46,7 +46,7 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     if not len(mesh.faces):
         return np.full(1, np.inf)
     corners = np.stack(at_corners(mesh.vertices, mesh.faces))
-    centre, normal = corners.mean(axis=0), cross(corners[1] - corners[0], corners[2] - corners[0])
+    centre, normal = corners.mean(axis=0), face_normals(*corners)
     normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
     radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
     points = points[:: max(len(points) // _ASKED, 1)]
@@ -62,7 +62,7 @@ def askew(mesh: Mesh, tree: KDTree, normals: np.ndarray) -> float:
     """Share of the area of the mesh, of 4096 and more of its faces, that is turned by more than 45 degrees from the
     normal of the nearest sample, of those in the `tree` with `normals` (n,3); 1 for a mesh without faces."""
     corners = np.stack(at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)]))
-    normal = cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal = face_normals(*corners)
     area, nearest = lengths(normal), tree.query(corners.mean(axis=0).T, workers=-1)[1]
     total = area.sum()
     return float(area[np.abs(dots(normal, normals[nearest].T)) < _TURNED * area].sum() / total) if total else 1.0

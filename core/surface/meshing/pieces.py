@@ -57,8 +57,7 @@ def pieces_touch(mesh: Mesh, reach: float) -> bool:
     count, piece = pieces_of(mesh)
     if count == 1:
         return False
-    edges, faces = mesh.edge_counts()
-    border = np.unique(edges[faces == 1])
+    border = np.flatnonzero(mesh.edges.ends_at(mesh.edges.count == 1))
     tree = KDTree(mesh.vertices)
     near = tree.query(mesh.vertices[border], k=_BESIDE, distance_upper_bound=reach, workers=-1)[1]
     piece = np.append(piece, -1)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...linalg import cross, dots, lengths, symmetric
-from ..mesh import Mesh, at_corners
+from ...linalg import dots, lengths
+from ..mesh import Mesh, at_corners, face_normals
 
 _SHORT = 0.3  # cells, edges whose ends become one
 _FLAT = 0.15  # height of triangles over their longest side, below which this is turned
@@ -45,9 +45,7 @@ def _around_slivers(mesh, cell):
     flatness, longest = _shape(*at_corners(mesh.vertices, mesh.faces))
     near = flatness * longest < _SHORT * cell
     for _ in range(2):
-        vertices = np.zeros(len(mesh.vertices), bool)
-        vertices[mesh.faces[near]] = True
-        near = mesh.with_halves(vertices[mesh.faces].any(axis=1))
+        near = mesh.with_halves(mesh.faces_at(mesh.vertices_of(near)))
     return near
 
 
@@ -55,7 +53,7 @@ def _shape(a, b, c):
     """Height of triangles over their longest side, by their corners (3,f) each, and that side, (f,)."""
     square = np.max([dots(p - q, p - q) for p, q in ((a, b), (b, c), (c, a))], axis=0)
     square = np.maximum(square, np.finfo(float).tiny)
-    return lengths(cross(b - a, c - a)) / square, np.sqrt(square)
+    return lengths(face_normals(a, b, c)) / square, np.sqrt(square)
 
 
 def _with_ends_joined(mesh, free, shortest, cell, chance):
@@ -69,7 +67,7 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     low, high = mesh.edges.low, mesh.edges.high
     length = ((x[low] - x[high]) ** 2).sum(axis=1)
     short = chance.permutation(np.flatnonzero((length < shortest**2) & free[low] & free[high]))
-    links = symmetric(np.ones(len(low), np.int32), low, high, n)
+    links = mesh.edges.links()
     shared = np.asarray(links[low[short]].multiply(links[high[short]]).sum(axis=1)).reshape(-1)
     ends = np.stack([low, high])[:, short[shared == 2]]
     ends = ends[:, _no_neighbours(ends, low, high, n)]
@@ -83,7 +81,7 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     at = number[mesh.faces]
     edge, gone = at.max(axis=1), (at >= 0).sum(axis=1) == 2
     beside = np.flatnonzero((edge >= 0) & ~gone)
-    alike = _alike(*(_normals(*at_corners(places, mesh.faces[beside])) for places in (x, joined)), cell)
+    alike = _alike(*(face_normals(*at_corners(places, mesh.faces[beside])) for places in (x, joined)), cell)
     stays = np.zeros(ends.shape[1], bool)
     stays[edge[beside[~alike]]] = True
     across = mesh.faces[gone][at[gone] < 0]
@@ -112,7 +110,7 @@ def _no_neighbours(ends, low, high, n):
 def _straightness(mesh):
     """1 for vertices whose faces are in a plane, 0 where these lie on each other as at a rim, (v,) float64."""
     n, corner = len(mesh.vertices), mesh.faces.reshape(-1)
-    normal = _normals(*at_corners(mesh.vertices, mesh.faces))
+    normal = face_normals(*at_corners(mesh.vertices, mesh.faces))
     total = np.stack([np.bincount(corner, np.repeat(x, 3), n) for x in normal])
     area = np.bincount(corner, np.repeat(lengths(normal), 3), n)
     return lengths(total) / np.maximum(area, np.finfo(float).tiny)
@@ -137,9 +135,9 @@ def _with_sides_turned(mesh, free, cell):
     turned = [np.stack([c, a, d], axis=1), np.stack([c, d, b], axis=1)]
     places = [at_corners(mesh.vertices, each) for each in turned]
     better = np.minimum(*(_shape(*each)[0] for each in places)) > np.minimum(flatness[row], flatness[other])
-    normal = _normals(*(corner[:, other] for corner in corners))
+    normal = face_normals(*(corner[:, other] for corner in corners))
     for each in places:
-        better &= _alike(normal, _normals(*each), cell)
+        better &= _alike(normal, face_normals(*each), cell)
     better &= (c != d) & (edges.faces_between(c, d) == 0)
     can = np.flatnonzero(better)
     first = np.full(len(faces), len(row))
@@ -154,11 +152,6 @@ def _with_sides_turned(mesh, free, cell):
         faces[face[can]], whole[face[can]] = each[can], False
     paired = whole[: 2 * mesh.pairs].reshape(2, -1).all(axis=0)
     return replace(mesh, faces=faces).of_faces(np.ones(len(faces), bool), paired)
-
-
-def _normals(a, b, c):
-    """(3,f), twice as long as the area of triangles with corners (3,f) each."""
-    return cross(b - a, c - a)
 
 
 def _alike(before, after, cell):

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from ...lookup import edge_keys
 from ...parallel import over_rows
 from ..mesh import AT_ONCE, Mesh, at_corners, vertex_normals
 from ..mesh_edges import Edges
 from .evening import FLAT
-from .fillings import edge_keys
 
 _EVEN = 1.5  # times the other's squared length, that a diagonal may have
 _CURVED = 0.004  # of the length, by which the eightfold rise must differ

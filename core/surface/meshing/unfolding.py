@@ -5,9 +5,9 @@ from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots, lengths
+from ...linalg import dots, lengths
 from ...parts import connected_parts
-from ..mesh import Mesh, at_corners
+from ..mesh import Mesh, at_corners, face_normals
 
 _FOLD = -0.5  # cosine between the normals of two faces, below which there is a fold between them
 _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; at a fold one has less
@@ -35,7 +35,7 @@ def unfolded(mesh: Mesh, surface: LocalSurface, cell: float, held: np.ndarray | 
     near[near] = _folded(*_cut_out(mesh, near)[1:])[0]
     if not near.any():
         return mesh
-    near = mesh.with_halves(_at(mesh, _grown(mesh, near, _AROUND)))
+    near = mesh.with_halves(mesh.faces_at(_grown(mesh, near, _AROUND)))
     row, part, cut = _cut_out(mesh, near)
     for stays in (cut | np.broadcast_to(held, len(mesh.vertices))[row], cut):
         for rings in range(_RINGS):
@@ -76,30 +76,21 @@ def _distance(points, vertices, faces):
 
 def _beside_folds(mesh):
     """Which faces have a vertex next to a fold, or are half of a quad that has, (f,) bool."""
-    return mesh.with_halves(_at(mesh, mesh.normals[1] < _BENT))
+    return mesh.with_halves(mesh.faces_at(mesh.normals[1] < _BENT))
 
 
 def _cut_out(mesh, near):
     """The vertices (p,) of the faces `near`, (f,) bool, the mesh of these, in the same order where quads are whole, and
     which of its vertices others have, too, (p,) bool."""
-    row = np.unique(mesh.faces[near])
-    beyond = np.zeros(len(mesh.vertices), bool)
-    beyond[mesh.faces[~near]] = True
-    return row, mesh.part(near), beyond[row]
-
-
-def _at(mesh, chosen):
-    """Which faces have a vertex that is `chosen`, (v,) bool, (f,) bool."""
-    first, second, third = (chosen[corner] for corner in mesh.faces.T)
-    return first | second | third
+    row = np.flatnonzero(mesh.vertices_of(near))
+    return row, mesh.part(near), mesh.vertices_of(~near)[row]
 
 
 def _grown(mesh, chosen, rings):
     """The vertices of the faces `chosen`, (f,) bool, and of so many rings of faces around them, (v,) bool."""
-    found = np.zeros(len(mesh.vertices), bool)
-    found[mesh.faces[chosen]] = True
+    found = mesh.vertices_of(chosen)
     for _ in range(rings):
-        found[mesh.faces[_at(mesh, found)]] = True
+        found = mesh.vertices_of(mesh.faces_at(found))
     return found
 
 
@@ -107,7 +98,7 @@ def _folded(mesh, cut):
     """Which faces are few between folds, (f,) bool: connected to no more across edges that are no folds, nor to what is
     `cut` off, (v,) bool; and which vertices are on folds between many faces, (v,) bool."""
     a, b, c = at_corners(mesh.vertices, mesh.faces)
-    normal, sides = cross(b - a, c - a), (b - a, c - b, a - c)
+    normal, sides = face_normals(a, b, c), (b - a, c - b, a - c)
     double = lengths(normal)
     normal /= np.maximum(double, np.finfo(float).tiny)
     flat = double <= _FLAT * np.max([dots(side, side) for side in sides], axis=0)
@@ -119,9 +110,7 @@ def _folded(mesh, cut):
     few = (np.bincount(patch)[patch] <= _FEW) & ~np.isin(patch, patch[goes_on])
     beside = np.isin(patch, patch[np.append(one[fold], other[fold])])
     at = np.flatnonzero(count == 2)[fold & ~few[one] & ~few[other]]
-    rim = np.zeros(len(mesh.vertices), bool)
-    rim[low[at]] = rim[high[at]] = True
-    return few & beside, rim
+    return few & beside, mesh.edges.ends_at(at) > 0
 
 
 def _flaps(mesh, folded, cut):

@@ -13,10 +13,10 @@ from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, row_dots, unit
-from ...lookup import numbered, rows_of
+from ...lookup import edge_keys, numbered, rows_of
 from ...parts import connected_parts
-from ..mesh import Mesh, at_corners
-from ..meshing.fillings import edge_keys, fillings
+from ..mesh import Mesh, at_corners, face_normals
+from ..meshing.fillings import fillings
 
 _LONGEST = 64  # edges of a loop that may be closed
 _DETOUR, _CORNER = 1.5, 1.0  # of the way along the other sheet, relative to the straight one, and cells more
@@ -58,8 +58,7 @@ class _Borders:
     def of(cls, mesh) -> "_Borders":
         edges, counts = mesh.edge_counts()
         loops, paths = _simple_loops(_without_long_loops(edges[counts == 1]))
-        at_junction = np.zeros(len(mesh.vertices), bool)
-        at_junction[edges[counts > 2]] = True
+        at_junction = mesh.edges.ends_at(counts > 2) > 0
         return cls(edges, counts, loops, paths, [_parted(path, at_junction) for path in paths])
 
 
@@ -99,8 +98,7 @@ def _reach(vertices, triangle, loop, loops, surface):
 def _doubled(mesh, border, loops):
     """How far the faces at each loop's border lie on the side of its filling, (loops,) in [-1,1]: -1 around a hole, 1
     at the rim of a small flat sheet."""
-    n, at_border = len(mesh.vertices), np.zeros(len(mesh.vertices), bool)
-    at_border[border] = True
+    n, at_border = len(mesh.vertices), mesh.edges.ends_at(mesh.edges.count == 1) > 0
     ends, beyond = _sides(mesh.faces[at_border[mesh.faces].sum(axis=1) > 1])
     key = edge_keys(ends, n)
     own = np.flatnonzero(np.isin(key, edge_keys(border, n)))
@@ -129,7 +127,7 @@ def _covered(mesh, triangle, loop, loops, cell):
     tree = KDTree(((a + b + c) / 3).T, balanced_tree=False, compact_nodes=False)  # quick to make, for a few queries
     row = tree.query(middle, range(1, 1 + min(_AROUND, len(mesh.faces))), workers=-1)[1]
     a, b, c = (corner[:, row] - middle.T[:, :, None] for corner in (a, b, c))
-    normal = cross(b - a, c - a)
+    normal = face_normals(a, b, c)
     size = np.maximum(np.sqrt(dots(normal, normal)), _TINY)
     within = np.min([dots(cross(p, q), normal) for p, q in ((a, b), (b, c), (c, a))], axis=0) >= 0
     on = (within & (np.abs(dots(a, normal)) <= _ON * cell * size)).any(axis=1)

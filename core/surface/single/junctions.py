@@ -19,8 +19,7 @@ def onto_junctions(mesh: Mesh, surface: LocalSurface, cell: float, progress=None
 
     The samples nearest to such a vertex may all be of one sheet, so those that vertices around know are told to it.
     """
-    edges, count = mesh.edge_counts()
-    line = np.unique(edges[count > 2])
+    line = np.flatnonzero(mesh.edges.ends_at(mesh.edges.count > 2))
     if not len(line):
         return mesh
     around, towards = _around(mesh.edges.links(), line)

@@ -5,8 +5,8 @@ import numpy as np
 from ...field.blocks import Blocks, at_nodes
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, lengths, symmetric
-from ..mesh import Mesh, at_corners
+from ...linalg import lengths, symmetric
+from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.pieces import pieces_with_samples
 
 _OFF = 0.7, 1.0, 1.3  # cells from a face, where its side is told
@@ -23,7 +23,7 @@ def one_side(cover: Mesh, signed: np.ndarray | Blocks, surface: LocalSurface, gr
     goes to and fro between them, as the zero set of these distances does.
     """
     corners = np.stack(at_corners(cover.vertices, cover.faces))
-    middle, normal = corners.mean(axis=0), cross(corners[1] - corners[0], corners[2] - corners[0])
+    middle, normal = corners.mean(axis=0), face_normals(*corners)
     area = lengths(normal)
     normal /= np.maximum(area, np.finfo(float).tiny)
     side = np.zeros(len(cover.faces))

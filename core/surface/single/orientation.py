@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...linalg import cross, dots, lengths, symmetric
+from ...linalg import dots, lengths, symmetric
 from ...parts import connected_parts
-from ..mesh import Mesh, at_corners
+from ..mesh import Mesh, at_corners, face_normals
 from ..signs.spreading import spread_signs, spread_strongest
 
 _SMOOTH = 0.7  # least cosine between the normals of two faces across whose edge a surface is smooth
@@ -26,11 +26,11 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     if not n:
         return mesh, 0
     pair, against = np.stack(mesh.edges.beside), ~mesh.edges.alike
-    a, b, c = at_corners(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
-    normal = cross(b - a, c - a)
+    corners = at_corners(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
+    normal = face_normals(*corners)
     sign, patch = _spread(np.where(against, -1.0, 1.0), pair, normal, _beside_lines(mesh))
     turned = sign < 0
-    outwards = dots(normal, a)
+    outwards = dots(normal, corners[0])
     inwards = np.bincount(patch, np.where(turned, -outwards, outwards)) < 0
     turned ^= inwards[patch]
     halves = np.arange(2 * mesh.pairs).reshape(2, -1)
@@ -42,9 +42,8 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
 
 def _beside_lines(mesh):
     """Which faces have a vertex in common with one at an edge of three faces or more, (f,) bool."""
-    at_line, near = (mesh.edges.count > 2)[mesh.edges.number].any(axis=1), np.zeros(len(mesh.vertices), bool)
-    near[mesh.faces[at_line]] = True
-    return near[mesh.faces].any(axis=1)
+    at_line = (mesh.edges.count > 2)[mesh.edges.number].any(axis=1)
+    return mesh.faces_at(mesh.vertices_of(at_line))
 
 
 def _spread(relation, pair, normal, beside):

@@ -13,8 +13,8 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ...field.local_surface import LocalSurface
-from ...linalg import COMPONENTS, cross, lengths, principal_axes, row_dots, shortened, unit
-from ..mesh import Mesh, at_corners
+from ...linalg import COMPONENTS, lengths, principal_axes, row_dots, shortened, unit
+from ..mesh import Mesh, at_corners, face_normals
 from .rim_corners import Border
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
@@ -54,10 +54,8 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     next to where sheets meet. The faces are the same.
     """
     edges, counts = mesh.edge_counts()
-    border, n = edges[counts == 1], len(mesh.vertices)
-    ends = np.bincount(border.reshape(-1), minlength=n)
-    fixed = np.zeros(n, bool)
-    fixed[edges[counts > 2]] = True
+    border = edges[counts == 1]
+    ends, fixed = mesh.edges.ends_at(counts == 1), mesh.edges.ends_at(counts > 2) > 0
     loop = np.flatnonzero((ends == 2) & ~fixed)
     if not len(loop):
         return mesh
@@ -106,9 +104,8 @@ def _axes(mesh, row):
     """Normals (r,3) of the vertices `row` (r,), of either sign, whichever way the faces are wound."""
     asked = np.zeros(len(mesh.vertices), bool)
     asked[row] = True
-    faces = mesh.faces[asked[mesh.faces].any(axis=1)]
-    a, b, c = at_corners(mesh.vertices, faces)
-    normal = cross(b - a, c - a)
+    faces = mesh.faces[mesh.faces_at(asked)]
+    normal = face_normals(*at_corners(mesh.vertices, faces))
     normal /= np.sqrt(np.maximum(lengths(normal), np.finfo(float).tiny))
     products = (np.tile(normal[i] * normal[j], 3) for i, j in COMPONENTS)
     corner = faces.T.reshape(-1)

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots, lengths
-from ..mesh import Mesh, at_corners
+from ...linalg import dots, lengths
+from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.misfit import chamfer
 from ..meshing.pieces import pieces_of
 from .orientation import orient
@@ -56,8 +56,7 @@ def with_thin_walls(sheet: Mesh, unoriented: int, cover: Mesh, surface: LocalSur
 def _has_other_layer(cover, asked, middles, cell):
     """Which faces of a double cover, of those `asked` for, have one of its other layer flush with them, (k,) bool."""
     near = middles.query(middles.data[asked], k=range(2, 2 + min(_AROUND, middles.n - 1)), workers=-1)[1]
-    a, b, c = at_corners(cover.vertices, cover.faces)
-    normal = cross(b - a, c - a)
+    normal = face_normals(*at_corners(cover.vertices, cover.faces))
     normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
     step = (middles.data[near] - middles.data[asked, None]).transpose(2, 0, 1)
     own = normal[:, asked, None]

@@ -28,6 +28,14 @@ def test_a_junction_edge_has_more():
     assert sorted(counts.tolist()) == [1] * 6 + [3]
 
 
+def test_vertices_of_faces_and_faces_at_vertices():
+    mesh = Mesh(np.zeros((5, 3)), np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]], np.int32))
+    for chosen in ([0], np.array([True, False, False])):
+        assert np.flatnonzero(mesh.vertices_of(chosen)).tolist() == [0, 1, 2]
+    for vertex, faces in ((0, [0]), (1, [0, 1, 2]), (2, [0, 1]), (4, [2])):
+        assert np.flatnonzero(mesh.faces_at(np.arange(5) == vertex)).tolist() == faces
+
+
 def test_areas_in_closed_form():
     np.testing.assert_allclose(TETRAHEDRON.face_areas(), [0.5, 0.5, 0.5, np.sqrt(3) / 2])
 
