@@ -18,7 +18,7 @@ from .meshing.misfit import OFF
 from .meshing.pieces import without_small_pieces
 from .signed import signed_distance
 from .signs.sides import needed_band
-from .single.single_layer import boundary_of_inside
+from .single.routes import boundary_of_inside
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said

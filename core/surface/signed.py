@@ -15,11 +15,11 @@ from .mesh import Mesh
 from .meshing.evening import evened
 from .meshing.finishing import finished
 from .meshing.pieces import pieces_with_samples
+from .meshing.settling import settled
 from .meshing.triangles import mesh_of
 from .signs.sides import Sides
 from .signs.thin_parts import find_thin_parts
 from .signs.zero_set import zero_set
-from .single.settling import settled
 
 _CLAMP = 3.0  # cells; farther values do not matter for the mesh
 _SMOOTHING = 20  # rounds, over gaps

@@ -15,8 +15,8 @@ from ..mesh import Mesh
 from ..meshing.evening import evened
 from ..meshing.pieces import pieces_with_samples
 from ..meshing.planes import to_planes
+from ..meshing.settling import settled
 from ..meshing.triangles import mesh_of
-from .settling import settled
 from .sharing import shared_vertices
 
 _TOUCH = 0.35  # cells

@@ -14,10 +14,10 @@ from ..mesh import Mesh, in_use
 from ..mesh_edges import Edges
 from ..meshing.evening import evened
 from ..meshing.pieces import pieces_with_samples
+from ..meshing.settling import settled
 from ..meshing.triangles import mesh_of
 from ..signs.thin_parts import find_thin_parts
 from ..signs.zero_set import zero_set
-from .settling import settled
 
 _NEAR = 1.0  # cells, distance of the node next to a vertex; farther ones are where the distances end
 _COVERED = 0.4  # cells, a face whose middle is this close to the surface is on it, a farther one past its rim

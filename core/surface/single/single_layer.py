@@ -1,10 +1,10 @@
 """The single layer: one sheet, open where the surface is open, non-manifold where sheets meet."""
 
 from collections.abc import Callable
-from functools import cache, partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ...field.blocks import Blocks
 from ...field.grid import Grid
@@ -13,30 +13,17 @@ from ...field.steps import NearBand
 from ...progress import Progress
 from ...settings import Settings
 from ..double.double_cover import double_cover
-from ..edges.crossings import Crossings
-from ..edges.meetings import Meetings
+from ..edges.close_walls import beside_within_cells
+from ..edges.crossings import Crossings, find_crossings
+from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
-from ..meshing.finishing import finished
-from ..meshing.misfit import chamfer, misfit
-from ..signed import signed_mesh
-from ..signs.patches import patch_lengths, patches
-from ..signs.sides import Sides
-from ..signs.two_sides import LONG, two_sided
-from .dual_contour import dual_contour
-from .holes import fill_pinholes
-from .junctions import onto_junctions
-from .one_side import one_side
-from .open_sheet import open_sheet
-from .orientation import orient
-from .rims import at_rims, smooth_rims
-from .scraps import without_scraps
+from ..meshing.misfit import misfit
+from ..signs.sides import Sides, find_sides
+from ..signs.two_sides import two_sided
+from .routes import BETTER, ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
+from .thin_walls import with_thin_walls
 
-_PARTED = 0.01  # of the samples, missed by what parts sheets side by side, at most
-ROUGH = 0.12  # misfit of a mesh where sheets run side by side, beyond which another is looked at
-BETTER = 0.5  # times the misfit of one mesh, below which another is taken
-_MENDED = 2  # times, since holes may show where scraps are gone
-_BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
-_BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet
+_SHOWN = 0.005  # of the samples, that one layer shows and another misses; fewer may be chance
 
 
 def single_layer(
@@ -49,180 +36,126 @@ def single_layer(
     crossings : where the surface crosses the grid's edges     sides : the inside that these bound, if any
 
     Returns the mesh, in units of the samples, and the number of its edges across which it cannot be wound alike. A
-    whole run goes on from here where sheets run side by side and this is rough, see :class:`.layer.SingleLayer`.
+    whole run goes on from here where sheets run side by side and this is rough, see :meth:`SingleLayer.told_apart`.
     Raises :class:`SettingsError` where a double cover is needed and the box has no room for it.
     """
-    progress = Progress.of(progress)
-    two_sides = cache(lambda: two_sided(values, band, crossings, surface, grid, progress.part(0.0, 0.1)))
-    between = sheet_between_sides(two_sides, band, crossings, sides, surface, grid, progress.part(0.1, 0.3))
     cover = partial(double_cover, values, band, surface, grid, Settings().offset)
-    sheet = sheet_of_sides(values, crossings, sides, surface, grid, between, cover, progress.part(0.3, 0.5))
-    if sheet is not None:
-        return sheet, 0
-    return sheet_of_crossings(two_sides, band, crossings, surface, grid, between, cover, progress.part(0.5, 1.0))
+    layer = SingleLayer(values, band, surface, grid, cover, Progress.of(progress))
+    vars(layer)["_crossings_and_sides"] = crossings, sides
+    return layer.sheet
 
 
-def sheet_between_sides(
-    two_sides: Callable[[], np.ndarray | Blocks | None],
-    band: NearBand,
-    crossings: Crossings,
-    sides: Sides,
-    surface: LocalSurface,
-    grid: Grid,
-    progress=None,
-) -> Mesh | None:
-    """What lies between the two sides of a surface that bounds no inside, see :func:`open_sheet`, with one face or two
-    at every edge and all wound alike. None where it has no such sides, and where sheets meet but do not run side by
-    side, which it may part.
+@dataclass(frozen=True)
+class SingleLayer:
+    """The single layer, and what it is made of, each found when it is first asked for.
 
-    two_sides : function that gives the signed distances of :func:`two_sided`     band : the nodes near the surface
+    cover   : function that gives the double cover extracted at an offset
+    by_room : whether sheets side by side are told apart by the room that each sample has beside others, too
     """
-    progress, meetings = Progress.of(progress), crossings.meetings
-    if sides.complete or (crossings.normal.any() and not meetings.side_by_side):
-        return None
-    signed = two_sides()
-    if signed is None:
-        return None
-    found = open_sheet(signed, band, meetings.passing, surface, grid, progress.part(0.0, 0.8))
-    sheet, unoriented = _finished(found, meetings.passing, surface, grid, progress.part(0.8, 1.0))
-    return None if unoriented or len(_lines(sheet)) else sheet
 
+    values: np.ndarray | Blocks
+    band: NearBand
+    local: LocalSurface
+    grid: Grid
+    cover: Callable[[], Mesh]
+    progress: Progress
+    by_room: bool = False
 
-def sheet_of_sides(
-    values,
-    crossings: Crossings,
-    sides: Sides,
-    surface: LocalSurface,
-    grid: Grid,
-    between: Mesh | None,
-    cover: Callable[[], Mesh],
-    progress=None,
-) -> Mesh | None:
-    """The surface as one sheet, where it has two sides: the boundary of the inside, where that is the whole surface
-    (see :func:`boundary_of_inside`); else what lies `between` its sides (see :func:`sheet_between_sides`), if it is not
-    torn where sheets run side by side. None where there is none, as on one-sided surfaces and mostly where sheets meet.
+    @cached_property
+    def meetings(self) -> Meetings:
+        return find_meetings(self.local, self.progress.part(0.0, 0.05, "crossings"), self.by_room)
 
-    values : (nx,ny,nz) float32 or Blocks, unsigned distances     cover : function that gives the double cover
-    """
-    if sides.complete:
-        return boundary_of_inside(sides.sign(values), crossings.meetings, surface, grid, cover, progress)
-    if between is None or not crossings.normal.any():
-        return between
-    worst, missed = misfit(between, surface, grid.spacing)
-    return between if worst <= 1 and missed <= _PARTED else None
+    @property
+    def crossings(self) -> Crossings:
+        return self._crossings_and_sides[0]
 
+    @property
+    def sides(self) -> Sides:
+        return self._crossings_and_sides[1]
 
-def boundary_of_inside(
-    signed, meetings: Meetings, surface: LocalSurface, grid: Grid, cover: Callable[[], Mesh], progress=None
-) -> Mesh:
-    """The boundary of the inside of a closed surface, see :func:`signed_mesh`: closed and wound outwards.
+    @cached_property
+    def _crossings_and_sides(self):
+        """Crossings and sides by the meetings. Where these bound no inside, once more with the samples that
+        :func:`beside_within_cells` finds on close walls; kept only if an inside is bounded then, since elsewhere such
+        walls bring lines of more than two faces."""
+        found = self._found_by(self.meetings, self.progress.part(0.05, 0.2, "crossings"))
+        if found[1].complete or found[1].share == 1:
+            return found
+        more = self.meetings.with_beside(beside_within_cells(self.band, self.local, self.grid))
+        if more is self.meetings:
+            return found
+        other = self._found_by(more, self.progress.part(0.2, 0.3, "crossings"))
+        return other if other[1].complete else found
 
-    It has holes in walls so thin that hardly a node lies inside. A double cover extracted at an offset does not: around
-    a thin wall it has one layer in place of two. So where sheets run side by side its outer side is taken if that is
-    closed, too, and closer to the surface, as it is where all walls are thin; thick ones beside thin slits it misses.
+    def _found_by(self, meetings, progress):
+        crossings = find_crossings(self.band, self.local, self.grid, progress.part(0.0, 0.6), meetings)
+        return crossings, find_sides(self.values, crossings, self.local, self.grid, progress.part(0.6, 1.0))
 
-    signed : (nx,ny,nz) float32 or Blocks, distances, negative inside     cover : function that gives the double cover
-    """
-    mesh = signed_mesh(signed, meetings.passing, surface, grid, progress)
-    if not meetings.side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
-        return mesh
-    outer = mended(one_side(cover(), signed, surface, grid), surface, grid.spacing)
-    closed = (outer.edge_counts()[1] == 2).all()
-    closer = closed and chamfer(outer, surface, grid.spacing) < chamfer(mesh, surface, grid.spacing)
-    return outer if closer else mesh
+    @cached_property
+    def two_sides(self) -> np.ndarray | Blocks | None:
+        """Distances with the signs of the two sides of a surface that bounds no inside, see :func:`two_sided`."""
+        part = self.progress.part(0.3, 0.35, "single layer")
+        return two_sided(self.values, self.band, self.crossings, self.local, self.grid, part)
 
+    @cached_property
+    def between(self) -> Mesh | None:
+        """What lies between the two sides of a surface that bounds no inside."""
+        part = self.progress.part(0.35, 0.5, "single layer")
+        given = self.band, self.crossings, self.sides, self.local, self.grid
+        return sheet_between_sides(lambda: self.two_sides, *given, part)
 
-def sheet_of_crossings(
-    two_sides: Callable[[], np.ndarray | Blocks | None],
-    band: NearBand,
-    crossings: Crossings,
-    surface: LocalSurface,
-    grid: Grid,
-    between: Mesh | None,
-    cover: Callable[[], Mesh],
-    progress=None,
-) -> tuple[Mesh, int]:
-    """Any surface as one sheet by :func:`dual_contour`, with edges of several faces where sheets meet.
+    @cached_property
+    def of_sides(self) -> Mesh | None:
+        """The single layer of a surface with two sides."""
+        part = self.progress.part(0.3, 0.5, "single layer")
+        given = self.values, self.crossings, self.sides, self.local, self.grid, self.between
+        return sheet_of_sides(*given, self.cover, part)
 
-    Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
-    either side, may have handles where samples are sparse, and tears where the line ends; so it is taken only if
-    samples do not show the line, and the dual contour cannot be wound alike wherever it has two faces, and does not end
-    along the line, as where sheets meet. Creases may look like sheets that meet for some cells; so it is taken in place
-    of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines and no borders in
-    their place. Where sheets run side by side all may be torn; then see :func:`_of_torn`.
+    @cached_property
+    def sheet(self) -> tuple[Mesh, int]:
+        """That of any surface, and the number of its edges that cannot be wound alike."""
+        found = (self.of_sides, 0) if self.of_sides is not None else self._sheet_of_crossings()
+        vars(self).pop("two_sides", None)  # as large as the field, and not asked for again
+        return found
 
-    two_sides, cover : functions that give the signed distances of :func:`two_sided`, and the double cover
-    between          : what lies between the two sides there, which may be torn
-    Returns the mesh, wound alike wherever it can be, and the number of edges where it cannot (see :func:`orient`).
-    """
-    progress, meetings = Progress.of(progress), crossings.meetings
-    passing = meetings.passing
-    found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
-    sheet, unoriented = _finished(found, passing, surface, grid, progress.part(0.3, 0.5))
-    if not crossings.normal.any():
-        return sheet, unoriented
-    lines = _lines(sheet)
-    chance = not (unoriented or meetings.side_by_side) and _are_short(lines, grid)
-    shown = passing.any() and not meetings.side_by_side
-    if not chance and (shown or not unoriented):
-        return sheet, unoriented
-    signed = two_sides()
-    if signed is None:
-        return sheet, unoriented
-    if meetings.side_by_side:
-        one = _finished(one_side(cover(), signed, surface, grid), passing, surface, grid, Progress())
-        return _of_torn([one, (between, 0), (sheet, unoriented)], surface, grid)
-    found = open_sheet(signed, band, passing, surface, grid, progress.part(0.5, 0.9))
-    found, left = _finished(found, passing, surface, grid, progress.part(0.9, 1.0))
-    parted = _borders_beside(lines, found, grid.spacing)
-    replaces = not (left or parted or len(_lines(found))) if chance else parted <= _BORDERED * len(lines)
-    return (found, left) if replaces else (sheet, unoriented)
+    def _sheet_of_crossings(self):
+        part = self.progress.part(0.5, 0.7, "single layer")
+        given = self.band, self.crossings, self.local, self.grid, self.between
+        return sheet_of_crossings(lambda: self.two_sides, *given, self.cover, part)
 
+    @cached_property
+    def misfit(self) -> tuple[float, float]:
+        """:func:`misfit` of that."""
+        return misfit(self.sheet[0], self.local, self.grid.spacing)
 
-def _of_torn(sheets, surface, grid):
-    """The first of some sheets, each with the number of its edges that are not wound alike, unless another that there
-    is fits the samples far better: one side of a double cover shows one wall of thin parts, but is nowhere ragged."""
-    best, least = sheets[0], misfit(sheets[0][0], surface, grid.spacing)[0]
-    for sheet in sheets[1:]:
-        if sheet[0] is not None and (worst := misfit(sheet[0], surface, grid.spacing)[0]) < BETTER * least:
-            best, least = sheet, worst
-    return best
+    @property
+    def fit(self) -> tuple[float, float]:
+        """The same, but 0 where it bounds the inside and no sheets run side by side, as in thin walls."""
+        plain = self.sides.complete and not self.crossings.meetings.side_by_side
+        return (0.0, 0.0) if plain else self.misfit
 
+    @property
+    def is_rough(self) -> bool:
+        """Whether sheets run side by side, and it goes to and fro between them."""
+        return self.meetings.side_by_side and self.fit[0] > ROUGH
 
-def _lines(sheet):
-    """Both ends of the edges of more than two faces, (e,2,3)."""
-    edges, count = sheet.edge_counts()
-    return sheet.vertices[edges[count > 2]]
+    def told_apart(self) -> "SingleLayer":
+        """This, or where it is rough, the one with sheets told apart by their room: if its misfit is less than half of
+        this one's; or if it is less at all, shows more of the samples, and is torn (of a misfit above 1) only where
+        this is, too: a torn one has the double cover to stand in for it. It never takes the place of what lies between
+        two sides, which has no lines of more than two faces; it may have some, along creases."""
+        if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
+            return self
+        other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
+        if not other.meetings.adds_to(self.meetings):
+            return self
+        (worst, missed), (others_worst, others_missed) = self.misfit, other.misfit
+        shows_more = missed - others_missed > _SHOWN and (worst > 1) == (others_worst > 1)
+        return other if others_worst < (1 if shows_more else BETTER) * worst else self
 
-
-def _are_short(lines, grid):
-    """Whether there are lines of edges (e,2,3), and all of them are short."""
-    if not len(lines):
-        return False
-    length = patch_lengths(np.repeat(patches(lines.mean(axis=1), grid), 2), lines.reshape(-1, 3))
-    return length.max() <= LONG * max(grid.shape) * grid.spacing
-
-
-def _borders_beside(lines, sheet, cell):
-    """How many edges of one face a sheet has beside the lines of edges (e,2,3) of another."""
-    edges, count = sheet.edge_counts()
-    border = sheet.vertices[edges[count == 1]].mean(axis=1)
-    return int((KDTree(lines.mean(axis=1)).query(border)[0] < _BESIDE * cell).sum())
-
-
-def _finished(mesh, passing, surface, grid, progress):
-    """A sheet mended, wound alike, and sharp where sheets meet or fold, and the number of edges across which it is not
-    wound alike."""
-    sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
-    sheet = onto_junctions(sheet, surface, grid.spacing, progress.part(0.0, 0.5))
-    return finished(sheet, passing, surface, grid.spacing, progress.part(0.5, 1.0)), unoriented
-
-
-def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
-    """A sheet with its pinholes closed, scraps taken off, and its borders smoothed."""
-    for _ in range(_MENDED):
-        filled = fill_pinholes(mesh, surface, cell)
-        mesh = without_scraps(filled, surface, cell)
-        if mesh is filled:
-            break
-    return smooth_rims(mesh, surface, cell, at_rims(mesh, surface, cell))
+    def with_thin_walls(self) -> tuple[Mesh, int]:
+        """The single layer, with pieces of the double cover around thin walls where it is rough and has no two sides;
+        see :func:`with_thin_walls`."""
+        if not self.is_rough or self.of_sides is not None:
+            return self.sheet
+        return with_thin_walls(*self.sheet, self.cover(), self.local, self.grid.spacing)

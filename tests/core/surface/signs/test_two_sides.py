@@ -10,7 +10,7 @@ from core.field.blocks import Blocks
 from core.linalg import symmetric
 from core.progress import Progress
 from core.surface.signs.two_sides import _orientations, two_sided
-from core.surface.single.layer import SingleLayer
+from core.surface.single.single_layer import SingleLayer
 from tests import shapes
 
 

@@ -6,7 +6,7 @@ import pytest
 from core import Mesh, Settings, reconstruct
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.single import single_layer
+from core.surface.single import routes
 from core.surface.single.rims import at_rims, smooth_rims
 from tests import shapes
 
@@ -40,7 +40,7 @@ def pairs():
                 found[name] = mesh, after, spacing, surface.points
                 return after
 
-            patch.setattr(single_layer, "smooth_rims", kept)
+            patch.setattr(routes, "smooth_rims", kept)
             reconstruct(points, Settings(resolution=48, surface="single"))
     return found
 

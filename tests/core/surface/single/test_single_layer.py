@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from core import Settings, reconstruct
 from core.points import local_spacing
 from core.surface.meshing import misfit
-from core.surface.single import single_layer, thin_walls
+from core.surface.single import routes, thin_walls
 from tests import shapes
 
 
@@ -426,6 +426,6 @@ def test_thin_walls_have_no_holes(kind):
 
 def test_what_is_around_walls_is_taken_only_if_it_is_closer(monkeypatch):
     """Were it farther off than what has the holes, these would stay."""
-    monkeypatch.setattr(single_layer, "chamfer", lambda *given: -misfit.chamfer(*given))
+    monkeypatch.setattr(routes, "chamfer", lambda *given: -misfit.chamfer(*given))
     run = single(shapes.scattered_tube(12_000, 0.04), resolution=40, denoise=0)
     assert shapes.euler(run.sheet) < 0

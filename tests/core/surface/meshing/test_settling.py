@@ -3,7 +3,7 @@ import pytest
 
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
-from core.surface.single.settling import settled
+from core.surface.meshing.settling import settled
 from tests import shapes
 from tests.counted import Counted
 

@@ -5,8 +5,8 @@ import pytest
 
 from core import Settings, reconstruct
 from core.surface.meshing.misfit import distances
-from core.surface.single import layer
-from core.surface.single.layer import SingleLayer
+from core.surface.single import single_layer
+from core.surface.single.single_layer import SingleLayer
 from tests import shapes
 
 
@@ -72,8 +72,8 @@ def test_what_room_tells_apart_is_taken_if_far_less_rough_or_if_it_shows_more(ro
 
 @pytest.mark.parametrize(("tells", "layers"), [(True, 2), (False, 1)])
 def test_no_other_layer_is_made_where_room_tells_no_more_sheets(tells, layers, monkeypatch):
-    made, cross, meet = [], layer.find_crossings, layer.find_meetings
-    monkeypatch.setattr(layer, "find_crossings", lambda *given: made.append(given) or cross(*given))
-    monkeypatch.setattr(layer, "find_meetings", lambda *given: meet(*given[:2], by_room=given[2] and tells))
+    made, cross, meet = [], single_layer.find_crossings, single_layer.find_meetings
+    monkeypatch.setattr(single_layer, "find_crossings", lambda *given: made.append(given) or cross(*given))
+    monkeypatch.setattr(single_layer, "find_meetings", lambda *given: meet(*given[:2], by_room=given[2] and tells))
     single(glued_roll())
     assert len(made) == layers
