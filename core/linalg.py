@@ -1,7 +1,8 @@
-"""Principal axes of many symmetric 3x3 tensors at once, in closed form; many small systems; products of vectors.
+"""Principal axes of many symmetric 3x3 tensors at once, in closed form; products and lengths of vectors; many small
+systems, and large sparse ones.
 
-A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis. With another number of
-threads BLAS and LAPACK round differently, OpenBLAS even in systems of three equations, so what results depend on is
+A tensor is stored as six components (xx, yy, zz, xy, xz, yz) along the last axis. With another number of threads BLAS
+and LAPACK round differently, OpenBLAS even in systems of three equations, so what places and directions come from is
 summed and solved here.
 """
 
