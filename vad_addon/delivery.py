@@ -13,7 +13,7 @@ from .attributes import Attribute
 from .outcome import Outcome
 from .points_in import Source, object_of
 
-OWN = {"normal", "confidence", "distance", "moved", "radius"}  # attributes that results set themselves
+_OWN = {"normal", "confidence", "distance", "moved", "radius"}  # attributes that results set themselves
 
 
 def deliver(
@@ -72,6 +72,20 @@ def deliver(
     return collection
 
 
+def of_samples(source: Source, outcome: Outcome) -> tuple[dict[str, Attribute], dict[str, Attribute]]:
+    """What the samples carry: of their points, and what a run found of them."""
+    carried = {
+        name: attribute[outcome.source_index] for name, attribute in source.attributes.items() if name not in _OWN
+    }
+    found = dict(normal=Attribute.of(outcome.normals), confidence=Attribute.of(outcome.confidence))
+    return carried, found | dict(radius=radius(outcome))
+
+
+def radius(outcome: Outcome) -> Attribute:
+    """How large points are drawn."""
+    return Attribute.of(np.full(len(outcome.points), 0.25 * outcome.cell))
+
+
 def _data(source, outcome, warnings, rollback):
     """New data-blocks by role; `rollback` removes them and the volume's file."""
 
@@ -79,13 +93,7 @@ def _data(source, outcome, warnings, rollback):
         rollback.callback(bpy.data.batch_remove, [data])
         return data
 
-    carried = {name: attribute for name, attribute in source.attributes.items() if name not in OWN}
-    carried = {name: attribute[outcome.source_index] for name, attribute in carried.items()}
-    own = dict(
-        normal=Attribute.of(outcome.normals),
-        confidence=Attribute.of(outcome.confidence),
-        radius=Attribute.of(np.full(len(outcome.points), 0.25 * outcome.cell)),
-    )
+    carried, own = of_samples(source, outcome)
     name, origin = source.name, outcome.origin
     made = {
         results.SAMPLES: keep(

@@ -32,12 +32,8 @@ def fit_fog(volume: bpy.types.Volume, cell: float, shape: tuple[int, int, int]) 
 
 
 def _fog_material(name, cell):
-    material = bpy.data.materials.new(name)
+    material, nodes, links = _blank(name)
     material[_FOG] = True
-    if material.node_tree is None:  # before Blender 5.0
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
     volume, output = nodes.new("ShaderNodeVolumePrincipled"), nodes.new("ShaderNodeOutputMaterial")
     volume.inputs["Color"].default_value = 0.35, 0.65, 1.0, 1.0
     volume.inputs["Density"].default_value = _OPACITY / cell
@@ -49,11 +45,7 @@ def _fog_material(name, cell):
 def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
     """A material that emits a colour for the attribute `distance`, from 0 to `far`, with a dark line every two cells
     and the surface itself in white; by the attribute `slope` lines are as wide where the distance grows slowly."""
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:  # before Blender 5.0
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
+    material, nodes, links = _blank(name)
 
     def node(kind):
         made = nodes.new(kind)
@@ -99,11 +91,7 @@ def iso_lines(name: str, cell: float, far: float) -> bpy.types.Material:
 
 def carried_colours(name: str, attribute: str) -> bpy.types.Material:
     """A plain surface in the colours that the points carry in `attribute`."""
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:  # before Blender 5.0
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
+    material, nodes, links = _blank(name)
     colour, surface, output = (
         nodes.new(kind) for kind in ("ShaderNodeAttribute", "ShaderNodeBsdfPrincipled", "ShaderNodeOutputMaterial")
     )
@@ -113,6 +101,15 @@ def carried_colours(name: str, attribute: str) -> bpy.types.Material:
     links.new(colour.outputs["Color"], surface.inputs["Base Color"])
     links.new(surface.outputs[0], output.inputs["Surface"])
     return material
+
+
+def _blank(name):
+    """A new material, its nodes, of which there are none yet, and its links."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # before Blender 5.0
+        material.use_nodes = True
+    material.node_tree.nodes.clear()
+    return material, material.node_tree.nodes, material.node_tree.links
 
 
 def _principled(material):

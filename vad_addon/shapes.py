@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from . import materials, overlay, results
+from . import datablocks, materials, overlay, results
 
 SHELL, SLICE, NORMALS = "shell", "slice", "normals"  # roles
 _GRID_BY_NAME = "GeometryNodeGetNamedGrid"
@@ -97,16 +97,8 @@ def _plane(size, axis):
     points = np.zeros((len(steps), len(steps), 3), np.float32)
     points[..., u], points[..., v] = steps[:, None] * size[u], steps[None, :] * size[v]
     corner = (np.arange(_SLICE_STEPS)[:, None] * len(steps) + np.arange(_SLICE_STEPS)).ravel()
-    faces = np.stack([corner, corner + len(steps), corner + len(steps) + 1, corner + 1], axis=1).astype(np.int32)
-    mesh = bpy.data.meshes.new("slice")
-    mesh.vertices.add(points.size // 3)
-    mesh.vertices.foreach_set("co", points.ravel())
-    mesh.loops.add(faces.size)
-    mesh.loops.foreach_set("vertex_index", faces.ravel())
-    mesh.polygons.add(len(faces))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, 4, dtype=np.int32))
-    mesh.update(calc_edges=True)
-    return mesh
+    faces = np.stack([corner, corner + len(steps), corner + len(steps) + 1, corner + 1], axis=1)
+    return datablocks.mesh_data("slice", points.reshape(-1, 3), [faces], 0, {})
 
 
 def _slice_nodes(field, axis):

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.settings import options
 from . import attributes, datablocks, extras, overlay, points_in, results, run, stored_field, volume_files
 from .attributes import Attribute
-from .delivery import OWN, deliver
+from .delivery import deliver, of_samples, radius
 from .operators import report_run
 from .outcome import CLEANING, NORMALS, Task
 from .points_in import AXIS, Source
@@ -51,7 +51,7 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         source, rows = self._source, found.source_index
         moved = np.linalg.norm(found.points - source.points[rows], axis=1)
         carried = {name: attribute[rows] for name, attribute in source.attributes.items()}
-        carried |= dict(moved=Attribute.of(moved), radius=_radius(found))
+        carried |= dict(moved=Attribute.of(moved), radius=radius(found))
         if source.constraints:
             axes = np.zeros_like(source.points)
             axes[source.constraints[0]] = source.constraints[1]
@@ -86,10 +86,8 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
 
     def deliver(self, context, scene, found):
         source = self._source
-        carried = {name: value[found.source_index] for name, value in source.attributes.items() if name not in OWN}
-        carried |= dict(normal=Attribute.of(found.normals), confidence=Attribute.of(found.confidence))
-        carried["radius"] = _radius(found)
-        cloud = datablocks.pointcloud_data(f"{source.name} normals", found.points, found.origin, carried)
+        carried, own = of_samples(source, found)
+        cloud = datablocks.pointcloud_data(f"{source.name} normals", found.points, found.origin, carried | own)
         origin = points_in.object_of(source)
         obj = results.estimate(scene, origin)
         if obj is None:
@@ -174,10 +172,6 @@ def _placed(scene, source, data, origin):
     homes = beside.users_collection if beside and beside.name in scene.objects else ()
     (homes[0] if homes else scene.collection).objects.link(obj)
     return obj
-
-
-def _radius(found):
-    return Attribute.of(np.full(len(found.points), 0.25 * found.cell))
 
 
 CLASSES = VAD_OT_denoise, VAD_OT_normals, VAD_OT_reextract
