@@ -16,7 +16,7 @@ from core.surface import choice
 from core.surface.double.layers import HAIR
 from core.surface.meshing import misfit
 from core.surface.meshing.misfit import askew, distances
-from core.surface.single import layer
+from core.surface.single import single_layer
 from tests import shapes
 
 CELL = 0.1
@@ -472,7 +472,7 @@ def fitted(run):
 
 
 def test_a_run_leaves_a_one_sided_sheet_alone_that_touches_itself(monkeypatch):
-    found = layer.sheet_of_crossings
+    found = single_layer.sheet_of_crossings
 
     def touching(*given):
         """With a flap on one of its edges."""
@@ -480,7 +480,7 @@ def test_a_run_leaves_a_one_sided_sheet_alone_that_touches_itself(monkeypatch):
         flap = [*sheet.faces[0, :2], len(sheet.vertices)]
         return Mesh(np.append(sheet.vertices, [[0, 0, 0]], axis=0), np.append(sheet.faces, [flap], axis=0)), unoriented
 
-    monkeypatch.setattr(layer, "sheet_of_crossings", touching)
+    monkeypatch.setattr(single_layer, "sheet_of_crossings", touching)
     run = reconstruct(shapes.moebius(1500), Settings(resolution=48))
     assert set(run.surface.edge_counts()[1]) == {2}
 
@@ -496,7 +496,7 @@ def is_of_sheet(run):
 
 def test_a_run_leaves_out_pockets_of_a_few_faces_beside_the_sheet(monkeypatch):
     """A closed scrap of six faces, whose inside and outside would be pieces of their own."""
-    found = layer.sheet_of_crossings
+    found = single_layer.sheet_of_crossings
     points, settings = shapes.junction(2000), Settings(resolution=48)
 
     def with_pocket(two_sides, band, crossings, surface, grid, *rest):
@@ -507,7 +507,7 @@ def test_a_run_leaves_out_pockets_of_a_few_faces_beside_the_sheet(monkeypatch):
         return replace(mesh, vertices=vertices, faces=np.concatenate([mesh.faces, faces.astype(np.int32)])), unoriented
 
     clean = reconstruct(points, settings).surface
-    monkeypatch.setattr(layer, "sheet_of_crossings", with_pocket)
+    monkeypatch.setattr(single_layer, "sheet_of_crossings", with_pocket)
     scrapped = reconstruct(points, settings).surface
     assert len(shapes.components(scrapped)) == len(shapes.components(clean)) == 1
     assert len(scrapped.faces) == len(clean.faces)
