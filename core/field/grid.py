@@ -8,6 +8,7 @@ from ..errors import InputError, SettingsError
 from ..given_arrays import finite_points
 
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T  # of a cell, as steps from its lowest node
+ADJACENT = 1.8  # cells, between the middles of edges of the grid that are next to each other
 PADDING = 0.125  # of the object's longest side, on every side
 
 

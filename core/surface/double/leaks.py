@@ -12,13 +12,13 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.blocks import SIDE, Blocks, at_nodes, block_corners, each, inner_nodes, marked_nodes, put, regions
-from ...field.grid import Grid, node_strides
+from ...field.grid import ADJACENT, Grid, node_strides
 from ...field.groups import HALF, middles_of
 from ...field.local_surface import LocalSurface
 from ...lookup import edge_keys, rows_of
 from ...parallel import over_rows
+from ...parts import near_parts
 from ...progress import Progress
-from ..signs.patches import patches
 from ..signs.sides import regions_beside
 
 _TIMES = 4  # that leaks are looked for: some show when others are shut
@@ -198,7 +198,7 @@ class _Field:
         tree, k = KDTree(self.surface.points[sample]), range(1, 1 + min(_AROUND, len(sample)))
         around = sample[tree.query(middle, k=k, workers=-1)[1]]
         radius = at_nodes(self.values, ends).max(axis=0) / np.median(self.surface.spacing[around], axis=1)
-        place = patches(middle, self.grid)
+        place = near_parts(middle, ADJACENT * self.grid.spacing)
         widest = np.zeros(place.max() + 1)
         np.maximum.at(widest, place, radius)
         parted = np.bincount(place, grown.parted[around].mean(axis=1)) / np.bincount(place)

@@ -14,7 +14,7 @@ from ...field.grid import Grid
 from ...field.steps import NearBand
 from ...linalg import dots, unit
 from ...parallel import in_order
-from ..signs.patches import patches
+from ...parts import near_parts
 
 _DIAGONAL = np.sqrt(2)  # cells: iso-surfaces may join nodes as far apart, at opposite corners of a face
 _FACING = -0.5  # largest cosine between the steps to both: wedges wider than 60 degrees need no help
@@ -39,7 +39,7 @@ def raise_ridges(values: np.ndarray | Blocks, band: NearBand, grid: Grid, level:
         for end in ends:
             np.maximum.at(height, end, found)
     row = np.flatnonzero(height)
-    ridge = patches(grid.positions(band.node[row]), grid, _NEXT)
+    ridge = near_parts(grid.positions(band.node[row]), _NEXT * grid.spacing)
     row = row[np.bincount(ridge)[ridge] >= _LEAST]
     own, typical = height[row], _averaged(height[row], grid.positions(band.node[row]), _AROUND * grid.spacing)
     off = _DIAGONAL * grid.spacing - level

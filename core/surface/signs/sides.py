@@ -20,13 +20,13 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...field.blocks import Blocks, at_nodes, counts, each, inner_nodes, marked_nodes, put, regions
-from ...field.grid import Grid, node_strides
+from ...field.grid import ADJACENT, Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...linalg import conjugate_gradients, symmetric
 from ...lookup import numbered
+from ...parts import near_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
-from .patches import patches
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
@@ -72,7 +72,8 @@ class Sides:
     @cached_property
     def largest(self) -> float:
         """The largest connected patch of either, relative to all crossings."""
-        most = max(np.bincount(patches(middle, self.grid)).max(initial=0) for middle in (self.alike, self.gaps))
+        reach = ADJACENT * self.grid.spacing
+        most = max(np.bincount(near_parts(middle, reach)).max(initial=0) for middle in (self.alike, self.gaps))
         return most / max(self.crossings, 1)
 
     @property

@@ -21,15 +21,15 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ...field.blocks import Blocks, each, put
-from ...field.grid import Grid
+from ...field.grid import ADJACENT, Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import conjugate_gradients, row_dots, symmetric
 from ...lookup import is_among, numbered
 from ...parallel import over_rows
+from ...parts import extents, near_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
-from .patches import patch_lengths, patches
 from .spreading import spread_strongest
 
 _NEAR_FOLD = 24  # samples around a place, among which the other sheet of a fold is looked for
@@ -229,8 +229,8 @@ def _agree(votes, side, band, grid, progress):
         return False
     low, high = votes.low[overruled], votes.high[overruled]
     middle = 0.5 * (grid.positions(band.node[low]) + grid.positions(band.node[high]))
-    patch = patches(middle, grid)
-    length = patch_lengths(patch, middle) / grid.spacing
+    patch = near_parts(middle, ADJACENT * grid.spacing)
+    length = extents(patch, middle) / grid.spacing
     if length.max() > LONG * max(grid.shape):
         return False
 

@@ -7,9 +7,10 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.blocks import Blocks
-from ...field.grid import Grid
+from ...field.grid import ADJACENT, Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
+from ...parts import extents, near_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
 from ..edges.meetings import Meetings
@@ -17,7 +18,6 @@ from ..mesh import Mesh
 from ..meshing.finishing import finished
 from ..meshing.misfit import chamfer, misfit
 from ..signed import signed_mesh
-from ..signs.patches import patch_lengths, patches
 from ..signs.sides import Sides
 from ..signs.two_sides import LONG
 from .dual_contour import dual_contour
@@ -174,7 +174,8 @@ def _are_short(lines, grid):
     """Whether there are lines of edges (e,2,3), and all of them are short."""
     if not len(lines):
         return False
-    length = patch_lengths(np.repeat(patches(lines.mean(axis=1), grid), 2), lines.reshape(-1, 3))
+    part = near_parts(lines.mean(axis=1), ADJACENT * grid.spacing)
+    length = extents(np.repeat(part, 2), lines.reshape(-1, 3))
     return length.max() <= LONG * max(grid.shape) * grid.spacing
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
-from ...parts import connected_parts
+from ...parts import connected_parts, extents
 from ..mesh import Mesh
 
 _SMALL = 32  # faces of a patch
@@ -62,9 +62,8 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
     first = np.flatnonzero(np.diff(label[order], prepend=-1))
     parts = np.split(order, first[1:])
     off = surface.project(corners.mean(axis=1)).distance
-    low = np.minimum.reduceat(corners.min(axis=1)[order], first)
-    high = np.maximum.reduceat(corners.max(axis=1)[order], first)
-    cost = np.maximum.reduceat(off[order], first) + _SIZE * np.linalg.norm(high - low, axis=1)
+    size = extents(np.repeat(label, 3), corners.reshape(-1, 3))
+    cost = np.maximum.reduceat(off[order], first) + _SIZE * size
     dropped, left = np.zeros(len(face), bool), counts.copy()
 
     def drop(part):

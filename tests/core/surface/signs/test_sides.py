@@ -11,7 +11,6 @@ from core.points import local_spacing
 from core.progress import Progress
 from core.surface.edges.crossings import Crossings
 from core.surface.edges.meetings import Meetings
-from core.surface.signs.patches import patch_lengths
 from core.surface.signs.sides import Sides, _numbered, _sides, find_sides, may_be_closed
 from tests import shapes
 
@@ -214,8 +213,3 @@ def test_signs():
     signed = Sides(inside, nowhere, np.empty(0, bool), nowhere, 0, GRID).sign(values)
     assert signed.dtype == np.float32
     np.testing.assert_array_equal(signed, np.where(inside, -1, 1))
-
-
-def test_patches_are_as_long_as_the_boxes_around_them():
-    place = np.array([[0.0, 0, 0], [5, 5, 5], [3, 0, 1], [1, 4, 0]])
-    np.testing.assert_array_equal(patch_lengths(np.array([0, 1, 0, 0]), place), [np.sqrt(9 + 16 + 1), 0])
