@@ -6,8 +6,6 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from ..linalg import symmetric
-
 
 @dataclass(frozen=True, eq=False)
 class Edges:
@@ -63,7 +61,9 @@ class Edges:
 
     def links(self) -> csr_matrix:
         """Ones where an edge joins two vertices, (n,n) sparse and symmetric."""
-        return symmetric(np.ones(len(self.low)), self.low, self.high, self.n)
+        table = self._table
+        upper = csr_matrix((np.ones(len(table.data)), table.indices, table.indptr), table.shape)
+        return upper + upper.T.tocsr()
 
     def faces_between(self, tail: np.ndarray, head: np.ndarray) -> np.ndarray:
         """How many faces there are at an edge between vertices `tail` and `head`, of one shape; 0 where is none."""

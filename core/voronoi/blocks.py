@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from ..parallel import in_order
 from ..progress import Progress
 
-SIZE = 2000  # points that a block owns, at most, where it has not too many others to heed
+SIZE = 2500  # points that a block owns, at most, where it has not too many others to heed
 
 _CROWDED = 4.0  # points in a block, for each that it owns
 _WIDE = 4.0  # median reaches of a block

@@ -65,33 +65,37 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     """
     n, x = len(mesh.vertices), mesh.vertices
     low, high = mesh.edges.low, mesh.edges.high
-    length = ((x[low] - x[high]) ** 2).sum(axis=1)
-    short = chance.permutation(np.flatnonzero((length < shortest**2) & free[low] & free[high]))
+    columns = np.ascontiguousarray(x.T)
+    step = columns.take(high, axis=1) - columns.take(low, axis=1)
+    short = chance.permutation(np.flatnonzero((dots(step, step) < shortest**2) & free[low] & free[high]))
     links = mesh.edges.links()
     shared = np.asarray(links[low[short]].multiply(links[high[short]]).sum(axis=1)).reshape(-1)
     ends = np.stack([low, high])[:, short[shared == 2]]
     ends = ends[:, _no_neighbours(ends, low, high, n)]
     if not ends.size:
         return mesh
-    weight = _EVEN + 1 - _straightness(mesh)[ends][..., None]
-    joined = x.copy()
-    joined[ends] = (weight * x[ends]).sum(axis=0) / weight.sum(axis=0)
     number = np.full(n, -1)
     number[ends] = np.arange(ends.shape[1])
-    at = number[mesh.faces]
+    near = np.flatnonzero(mesh.faces_at(number >= 0))
+    faces = mesh.faces[near]
+    weight = _EVEN + 1 - _straightness(x, faces)[ends][..., None]
+    joined = x.copy()
+    joined[ends] = (weight * x[ends]).sum(axis=0) / weight.sum(axis=0)
+    at = number[faces]
     edge, gone = at.max(axis=1), (at >= 0).sum(axis=1) == 2
-    beside = np.flatnonzero((edge >= 0) & ~gone)
-    alike = _alike(*(face_normals(*at_corners(places, mesh.faces[beside])) for places in (x, joined)), cell)
+    alike = _alike(*(face_normals(*at_corners(places, faces[~gone])) for places in (x, joined)), cell)
     stays = np.zeros(ends.shape[1], bool)
-    stays[edge[beside[~alike]]] = True
-    across = mesh.faces[gone][at[gone] < 0]
+    stays[edge[~gone][~alike]] = True
+    across = faces[gone][at[gone] < 0]
     stays[edge[gone][np.diff(links.indptr)[across] == 3]] = True
     one, other = ends[:, ~stays]
     if not len(one):
         return mesh
     vertices, into = x.copy(), np.arange(n, dtype=mesh.faces.dtype)
     vertices[one], into[other] = joined[one], one
-    return replace(mesh, vertices=vertices, faces=into[mesh.faces]).of_faces(~gone | stays[edge])
+    kept = np.ones(len(mesh.faces), bool)
+    kept[near] = ~gone | stays[edge]
+    return replace(mesh, vertices=vertices, faces=into[mesh.faces]).of_faces(kept)
 
 
 def _no_neighbours(ends, low, high, n):
@@ -107,10 +111,10 @@ def _no_neighbours(ends, low, high, n):
     return (near[ends] == rank).all(axis=0)
 
 
-def _straightness(mesh):
-    """1 for vertices whose faces are in a plane, 0 where these lie on each other as at a rim, (v,) float64."""
-    n, corner = len(mesh.vertices), mesh.faces.reshape(-1)
-    normal = face_normals(*at_corners(mesh.vertices, mesh.faces))
+def _straightness(vertices, faces):
+    """1 for vertices (v,3) whose faces (f,3) are in a plane, 0 where these lie on each other as at a rim, (v,)."""
+    n, corner = len(vertices), faces.reshape(-1)
+    normal = face_normals(*at_corners(vertices, faces))
     total = np.stack([np.bincount(corner, np.repeat(x, 3), n) for x in normal])
     area = np.bincount(corner, np.repeat(lengths(normal), 3), n)
     return lengths(total) / np.maximum(area, np.finfo(float).tiny)

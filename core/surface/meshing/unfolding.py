@@ -71,7 +71,8 @@ def _distance(points, vertices, faces):
     """Distance (m,) from points (m,3) to the nearest corner, middle of a side, or centroid of faces."""
     corners = vertices[faces]
     places = [corners[:, 0], corners.mean(axis=1), *(0.5 * (corners[:, k] + corners[:, k - 1]) for k in range(3))]
-    return KDTree(np.concatenate([vertices[np.unique(faces)], *places[1:]])).query(points)[0]
+    places = np.concatenate([vertices[np.unique(faces)], *places[1:]])
+    return KDTree(places, balanced_tree=False, compact_nodes=False).query(points)[0]  # quick to make, for a few queries
 
 
 def _beside_folds(mesh):
