@@ -17,6 +17,8 @@ _LAYOUT = {  # attribute type -> name of the value, width, NumPy type
     "BYTE_COLOR": ("color", 4, np.float32),
 }
 
+_LONGEST = 62  # bytes of a name; there may be 67, with what may be put before it
+
 
 @dataclass(frozen=True)
 class Attribute:
@@ -47,11 +49,17 @@ def read(data) -> dict[str, Attribute]:
 
 
 def write(data, attributes: dict[str, Attribute]) -> None:
-    """Set these attributes on the points of `data`, replacing those of the same name."""
+    """Set these attributes on the points of `data`, replacing those of the same name. Those that points cannot have in
+    Blender, as `material_index`, get `scan_` before their name, and long names are cut off."""
     for name, attribute in attributes.items():
+        name = name.encode()[:_LONGEST].decode(errors="ignore")
         if name in data.attributes and data.attributes[name].data_type != attribute.kind:
             data.attributes.remove(data.attributes[name])
-        target = data.attributes.get(name) or data.attributes.new(name, attribute.kind, "POINT")
+        target = (
+            data.attributes.get(name)
+            or data.attributes.new(name, attribute.kind, "POINT")
+            or data.attributes.new(f"scan_{name}", attribute.kind, "POINT")
+        )
         target.data.foreach_set(_LAYOUT[attribute.kind][0], np.ascontiguousarray(attribute.values).ravel())
 
 

@@ -10,14 +10,14 @@ from .points_in import AXIS
 
 def held_by(obj: bpy.types.Object) -> bool:
     """Whether some points of `obj` may have a fixed axis."""
-    if obj.type == "MESH" and obj.mode == "EDIT":
+    if obj.type == "MESH" and obj.data.is_editmode:
         return bmesh.from_edit_mesh(obj.data).verts.layers.float_vector.get(AXIS) is not None
     return obj.type in {"MESH", "POINTCLOUD"} and AXIS in obj.data.attributes
 
 
 def read(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """The points of `obj` that have a fixed axis, (k,3), and these, (k,3) unit, both in the object's space."""
-    if obj.type == "MESH" and obj.mode == "EDIT":
+    if obj.type == "MESH" and obj.data.is_editmode:
         mesh = bmesh.from_edit_mesh(obj.data)
         layer = mesh.verts.layers.float_vector[AXIS]
         held = [(vertex.co, vertex[layer]) for vertex in mesh.verts if any(vertex[layer])]
@@ -32,16 +32,13 @@ def read(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
 
 def fix(obj: bpy.types.Object, axes) -> int:
     """Give the selected vertices of the mesh `obj`, in edit mode, this axis: a function from the coordinates (k,3) to
-    axes (k,3) or one axis (3,), in the object's space. Zeros free them. Returns how many there are.
-
-    Raises :class:`InputError` where nothing is selected.
-    """
+    axes (k,3) or one axis (3,), in the object's space. Zeros free them. Returns how many there are."""
     mesh = bmesh.from_edit_mesh(obj.data)
+    if not any(vertex.select for vertex in mesh.verts):
+        return 0
     layers = mesh.verts.layers.float_vector
     layer = layers.get(AXIS) or layers.new(AXIS)
     chosen = [vertex for vertex in mesh.verts if vertex.select]
-    if not chosen:
-        raise InputError(f"0 points of {obj.name} are selected: select those whose axis you know")
     wanted = axes(np.array([vertex.co for vertex in chosen]))
     for vertex, axis in zip(chosen, np.broadcast_to(wanted, (len(chosen), 3)), strict=True):
         vertex[layer] = axis
@@ -50,19 +47,17 @@ def fix(obj: bpy.types.Object, axes) -> int:
 
 
 def of_active(obj: bpy.types.Object) -> np.ndarray:
-    """Axis (3,) that the active element of the mesh `obj`, in edit mode, stands for: the normal of a face, the
-    direction of an edge, the fixed axis of a vertex; in the object's space, where it turns with the object as a normal
-    does, unlike an edge if the object is stretched. Raises :class:`InputError` where there is none."""
-    mesh = bmesh.from_edit_mesh(obj.data)
+    """Axis (3,), in world space, that the active element of the mesh `obj`, in edit mode, stands for: the normal of a
+    face, the direction of an edge, the fixed axis of a vertex. Raises :class:`InputError` where there is none."""
+    mesh, matrix = bmesh.from_edit_mesh(obj.data), np.array(obj.matrix_world, np.float64)[:3, :3]
     active, layer = mesh.select_history.active, mesh.verts.layers.float_vector.get(AXIS)
     axis = np.zeros(3)
     if isinstance(active, bmesh.types.BMFace):
-        axis = np.array(active.normal)
+        axis = np.array(active.normal) @ np.linalg.pinv(matrix)
     elif isinstance(active, bmesh.types.BMEdge):
-        matrix = np.array(obj.matrix_world, np.float64)[:3, :3]
-        axis = matrix @ np.array(active.verts[1].co - active.verts[0].co) @ matrix
+        axis = matrix @ np.array(active.verts[1].co - active.verts[0].co)
     elif active is not None and layer is not None:
-        axis = np.array(active[layer])
+        axis = np.array(active[layer]) @ np.linalg.pinv(matrix)
     if not axis.any():
         raise InputError("The active element has no axis: make a face, an edge or a point with a fixed axis active")
     return axis

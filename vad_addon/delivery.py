@@ -120,13 +120,15 @@ def _data(source, outcome, warnings, rollback):
 def _place(collection, role, data, origin):
     """Give the collection's object of this role new data, make it where it is missing, or remove it for lack of data.
 
-    An object that the user moved stays so unless the samples have another centre now.
+    An object that the user moved stays so unless the samples have another centre now, or its points were moved within
+    it, by Apply Transforms or Set Origin: its place is theirs then, and not that of new ones.
     """
     obj = results.member(collection, role)
     if data is None:
         if obj is not None:
             bpy.data.batch_remove([obj])
         return
+    moved_within = False
     if obj is None:
         obj = bpy.data.objects.new(data.name, data)
         obj[results.ROLE] = role
@@ -134,10 +136,20 @@ def _place(collection, role, data, origin):
     elif role == results.FIELD:
         datablocks.replace_volume(obj.data, data)
     else:
+        before, now = list(obj.get(results.BOX, ())), _box(obj.data)
+        moved_within = before[:1] == now[:1] and before != now  # with fewer points or more, it was edited
         datablocks.replace_data(obj.data, data)
-    if tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
+    if moved_within or tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
         obj[results.ORIGIN] = origin
         obj.location = origin
+    if role != results.FIELD:
+        obj[results.BOX] = _box(data)
+
+
+def _box(data):
+    points = datablocks.positions(data)
+    ends = (points.min(axis=0), points.max(axis=0)) if len(points) else ()
+    return [float(len(points)), *(float(x) for end in ends for x in end)]
 
 
 def _show_mesh_first(scene, collection, stays):

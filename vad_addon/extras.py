@@ -1,5 +1,7 @@
 """Operators that are instant: shapes that follow a result, and axes fixed by hand. Their redo panels are live."""
 
+from functools import partial
+
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -20,6 +22,25 @@ def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
     return context.scene.vad.result
 
 
+def _adding_problem(context):
+    """Why nothing can be added to the results that are meant, one line; empty where it can."""
+    collection = chosen_result(context)
+    if collection is None:
+        return "There are no results yet: reconstruct first"
+    if not results.is_editable(collection):
+        return f"{collection.name} is linked from another file: make it local"
+    if not _is_in(collection, context.view_layer.layer_collection):
+        return f"{collection.name} is not in this view layer, or excluded from it: include it in the outliner"
+    return ""
+
+
+def _is_in(collection, layer):
+    """Whether `collection` is the one of this layer collection or in it, and not excluded."""
+    if layer.collection == collection and not layer.exclude:
+        return True
+    return any(_is_in(collection, child) for child in layer.children)
+
+
 class _OfResult:
     """An operator that adds an object to the results of a run and makes it the active one."""
 
@@ -27,8 +48,9 @@ class _OfResult:
 
     @classmethod
     def poll(cls, context):
-        cls.poll_message_set("There are no results yet: reconstruct first")
-        return chosen_result(context) is not None
+        problem = _adding_problem(context)
+        cls.poll_message_set(problem)
+        return not problem
 
     def execute(self, context):
         try:
@@ -150,7 +172,9 @@ class _OfEditedMesh:
 
     def execute(self, context):
         try:
-            count = axes.fix(context.active_object, lambda points: self.axes(context, points))
+            count = sum(axes.fix(obj, partial(self.axes, context, obj)) for obj in context.objects_in_mode_unique_data)
+            if not count:
+                raise InputError("0 points are selected: select those whose axis you know")
         except VADError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -190,12 +214,11 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
         if self.origin == "TYPED":
             self.layout.prop(self, "axis")
 
-    def axes(self, context, points):
-        obj = context.active_object
+    def axes(self, context, obj, points):
         matrix = np.array(obj.matrix_world, np.float64)
         if self.origin == "ACTIVE":
-            return axes.of_active(obj)
-        if self.origin == "CURSOR":
+            world = axes.of_active(context.active_object)
+        elif self.origin == "CURSOR":
             world = np.array(context.scene.cursor.location) - (points @ matrix[:3, :3].T + matrix[:3, 3])
         elif self.origin == "VIEW":
             if context.region_data is None:
@@ -215,7 +238,7 @@ class VAD_OT_free_axes(_OfEditedMesh, bpy.types.Operator):
     bl_label = "Free Axes"
     done = "freed"
 
-    def axes(self, context, points):
+    def axes(self, context, obj, points):
         return np.zeros(3)
 
 

@@ -34,6 +34,7 @@ CLASSES = (
     *panel.CLASSES,
 )
 _NEW_DATA = bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
+_NEW_SCENES = bpy.app.handlers.load_post, bpy.app.handlers.depsgraph_update_post
 _SAVES = (
     (bpy.app.handlers.save_pre, volume_files.bring_along),
     (bpy.app.handlers.save_post, volume_files.keep_saved),
@@ -47,7 +48,8 @@ def register():
     bpy.types.Scene.vad = bpy.props.PointerProperty(type=properties.VAD_PG_scene)
     bpy.types.TOPBAR_MT_file_import.append(importer.draw_menu)
     presets.register()
-    bpy.app.handlers.load_post.append(preferences.prepare_scenes)
+    for handlers in _NEW_SCENES:
+        handlers.append(preferences.prepare_scenes)
     bpy.app.handlers.load_post.append(volume_files.delete_unused)
     for handlers, handler in _SAVES:
         handlers.append(handler)
@@ -63,7 +65,8 @@ def unregister():
     for handlers, handler in _SAVES:
         handlers.remove(handler)
     bpy.app.handlers.load_post.remove(volume_files.delete_unused)
-    bpy.app.handlers.load_post.remove(preferences.prepare_scenes)
+    for handlers in _NEW_SCENES:
+        handlers.remove(preferences.prepare_scenes)
     volume_files.delete_unused_at_exit()
     presets.unregister()
     bpy.types.TOPBAR_MT_file_import.remove(importer.draw_menu)

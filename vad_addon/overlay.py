@@ -9,7 +9,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 from gpu_extras.batch import batch_for_shader
 
-from . import axes, results
+from . import axes, points_in, results
 
 _handle = None
 _batches = {}  # by object and everything the drawing depends on
@@ -160,13 +160,15 @@ def _draw():
     shader.bind()
     shader.uniform_float("viewportSize", (context.region.width, context.region.height))
     shader.uniform_float("lineWidth", style.width)
-    for obj in _shown(context.visible_objects):
-        for batch in _batches_of(obj, style, shader):
-            with gpu.matrix.push_pop():
-                gpu.matrix.multiply_matrix(obj.matrix_world)
-                batch.draw(shader)
-    gpu.state.blend_set("NONE")
-    gpu.state.depth_test_set("NONE")
+    try:
+        for obj in _shown(context.visible_objects):
+            for batch in _batches_of(obj, style, shader):
+                with gpu.matrix.push_pop():
+                    gpu.matrix.multiply_matrix(obj.matrix_world)
+                    batch.draw(shader)
+    finally:
+        gpu.state.blend_set("NONE")
+        gpu.state.depth_test_set("NONE")
 
 
 def _shown(visible):
@@ -183,7 +185,7 @@ def _batches_of(obj, style, shader):
         make = _fixed_lines
     else:
         return
-    key = obj.data.name, obj.data.session_uid, obj.mode
+    key = obj.data.name, obj.data.session_uid, points_in.in_edit_mode(obj)
     if key not in _batches:
         lines = make(obj, style)
         content = {"pos": lines[0], "color": np.repeat(lines[1], 2, axis=0)}

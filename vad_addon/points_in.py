@@ -59,8 +59,8 @@ def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 def selection_problem(context: bpy.types.Context) -> str:
     """Why nothing can be reconstructed, one line; empty where something can."""
-    if sources(context):
-        return ""
+    if objects := sources(context):
+        return next((_is_off(obj) for obj in objects if _geometry(obj, context) is None), "")
     obj = active_object(context)
     if obj is None:
         return "No active object: select a point cloud or a mesh"
@@ -68,18 +68,36 @@ def selection_problem(context: bpy.types.Context) -> str:
     return f"{obj.name} ({kind}) holds no points: select a point cloud or a mesh"
 
 
+def in_edit_mode(obj: bpy.types.Object) -> bool:
+    """Whether `obj` is edited, itself or by way of another object with the same mesh."""
+    return obj.mode == "EDIT" or (obj.type == "MESH" and obj.data.is_editmode)
+
+
+def _geometry(obj, context):
+    """The geometry set of the object as the view layer shows it, or hides it by its eye; None where it is switched off
+    there. It owns its components: must outlive them."""
+    try:
+        return obj.evaluated_get(context.evaluated_depsgraph_get()).evaluated_geometry()
+    except TypeError:  # "Object geometry is not yet evaluated", which nothing else tells
+        return None
+
+
+def _is_off(obj):
+    return f"{obj.name} is disabled in viewports, or its collection is excluded: enable it in the outliner"
+
+
 def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected_only: bool = False) -> Source:
     """Every point of the objects as the viewport shows them.
 
     These are the vertices of meshes, the points of point clouds, the control points of curves and the origins of
     instances, after modifiers and geometry nodes. With `selected_only`, of objects in edit mode only what is selected
-    there. Raises :class:`InputError` where there are none.
+    there. Raises :class:`InputError` where there are none, and for objects that are disabled in viewports.
     """
     clouds = [_world_cloud(obj, context, selected_only) for obj in objects]
     points = np.concatenate([cloud[0] for cloud in clouds])
     name = objects[0].name if len(objects) == 1 else f"{objects[0].name} and {len(objects) - 1} more"
     if not len(points):
-        what = "selected points" if selected_only and objects[0].mode == "EDIT" else "points"
+        what = "selected points" if selected_only and in_edit_mode(objects[0]) else "points"
         raise InputError(f"{name} has 0 {what}: select an object with vertices or points")
     joined = attributes.join([(len(points), carried) for points, carried in clouds])
     axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
@@ -89,14 +107,16 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
 
 def point_count(objects: list[bpy.types.Object], context: bpy.types.Context) -> int:
     """Length of :func:`gather`'s points without copying any, cheap enough for every redraw. In mesh edit mode it leaves
-    out what modifiers add."""
+    out what modifiers add. Objects that are disabled in viewports count none."""
     return sum(_point_count(obj, context) for obj in objects)
 
 
 def _point_count(obj, context):
-    if obj.mode == "EDIT" and obj.type == "MESH":
+    if obj.type == "MESH" and obj.data.is_editmode:
         return len(bmesh.from_edit_mesh(obj.data).verts)
-    geometry = obj.evaluated_get(context.evaluated_depsgraph_get()).evaluated_geometry()
+    geometry = _geometry(obj, context)
+    if geometry is None:
+        return 0
     clouds = geometry.pointcloud, geometry.curves, geometry.instances_pointcloud()
     mesh = len(geometry.mesh.vertices) if geometry.mesh else 0
     return mesh + sum(cloud.attributes.domain_size("POINT") for cloud in clouds if cloud)
@@ -104,10 +124,12 @@ def _point_count(obj, context):
 
 def _world_cloud(obj, context, selected_only):
     """(n,3) float64 points in world space and what they carry."""
-    if obj.mode == "EDIT":
+    if in_edit_mode(obj):
         obj.update_from_editmode()
-    evaluated = obj.evaluated_get(context.evaluated_depsgraph_get())
-    parts = list(_components(evaluated, selected_only and obj.mode == "EDIT"))
+    geometry, evaluated = _geometry(obj, context), obj.evaluated_get(context.evaluated_depsgraph_get())
+    if geometry is None:
+        raise InputError(_is_off(obj))
+    parts = list(_components(evaluated, geometry, selected_only and in_edit_mode(obj)))
     local = np.concatenate([np.empty((0, 3)), *(points for points, _ in parts)])
     carried = attributes.join([(len(points), found) for points, found in parts])
     matrix = np.array(evaluated.matrix_world, np.float64)
@@ -116,9 +138,8 @@ def _world_cloud(obj, context, selected_only):
     return local @ matrix[:3, :3].T + matrix[:3, 3], carried
 
 
-def _components(evaluated, selected_only):
+def _components(evaluated, geometry, selected_only):
     """(n,3) float32 points of each component of the evaluated object, in its own space, and what they carry."""
-    geometry = evaluated.evaluated_geometry()  # owns the components below: must outlive them
     if evaluated.type == "MESH":  # in edit mode the geometry set holds an empty wrapper, to_mesh() the real vertices
         mesh = evaluated.to_mesh()
         flags = _values(mesh.vertices, "select", bool) if selected_only else None

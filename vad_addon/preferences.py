@@ -12,6 +12,7 @@ from .requirements import torch_hint
 
 PREFERRED = "resolution", "backend", "device", "memory_limit"  # settings with a default of the user's own
 _WIDTH = 90  # characters of a line in the preferences
+_given = {}  # by name, what was preferred when scenes were last looked at
 
 
 class VAD_OT_clear_cache(bpy.types.Operator):
@@ -63,12 +64,14 @@ class VAD_preferences(bpy.types.AddonPreferences):
 
 @persistent
 def prepare_scenes(*_) -> None:
-    """Give every scene in which they were not chosen yet the settings that the user prefers."""
+    """Give every scene in which nothing else was chosen the settings that the user prefers."""
     addon = bpy.context.preferences.addons.get(volume_files.PACKAGE)
     if addon is None or addon.preferences is None:  # run from a checkout
         return
     for name in PREFERRED:
         preferred = getattr(addon.preferences, name)
         for scene in bpy.data.scenes:
-            if not scene.vad.is_property_set(name) and preferred != getattr(scene.vad, name):
+            held = getattr(scene.vad, name)
+            if held != preferred and (held == _given.get(name) or not scene.vad.is_property_set(name)):
                 setattr(scene.vad, name, preferred)
+        _given[name] = preferred

@@ -3,6 +3,7 @@
 import bpy
 
 ROLE, ORIGIN = "vad_role", "vad_origin"  # of an object; the second is the place that its data is relative to
+BOX = "vad_box"  # of an object: number of its points and the corners of their box, as they were made
 SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 MESHES = SURFACE, SHEET
 ESTIMATE = "estimate"  # samples with normals alone, made without a run; its SOURCE is its own property
@@ -63,9 +64,14 @@ def previous(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.typ
     made = [
         collection
         for collection in scene.collection.children_recursive
-        if source is not None and collection.get(SOURCE) == source and collection.library is None
+        if source is not None and collection.get(SOURCE) == source and is_editable(collection)
     ]
     return scene.vad.result if scene.vad.result in made else (made or [None])[-1]
+
+
+def is_editable(block: bpy.types.ID) -> bool:
+    """Whether `block` is of this .blend: what is linked, or overridden, takes no other objects and no other data."""
+    return block.library is None and block.override_library is None
 
 
 def summary(collection: bpy.types.Collection) -> list[str]:

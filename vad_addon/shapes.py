@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
-from . import datablocks, materials, overlay, results
+from . import datablocks, materials, overlay, results, volume_files
 
 SHELL, SLICE, NORMALS = "shell", "slice", "normals"  # roles
 _GRID_BY_NAME = "GeometryNodeGetNamedGrid"
@@ -13,7 +13,7 @@ _SLICE_STEPS = 256  # faces along each side of a slice
 
 def shell(collection: bpy.types.Collection, offset: float) -> bpy.types.Object:
     """A mesh at distance `offset`, in grid cells, from the surface, by a Volume to Mesh modifier: turning its threshold
-    needs no new run. Raises :class:`InputError` without a volume."""
+    needs no new run. Raises :class:`InputError` without a volume that can be read."""
     field = _field(collection)
     obj = _object(f"{field.name} shell", bpy.data.meshes.new(f"{field.name} shell"), SHELL, collection, field)
     modifier = obj.modifiers.new("Volume to Mesh", "VOLUME_TO_MESH")
@@ -27,7 +27,7 @@ def shell(collection: bpy.types.Collection, offset: float) -> bpy.types.Object:
 
 def cut(collection: bpy.types.Collection, axis: int) -> bpy.types.Object:
     """A plane through the middle of the volume, across `axis` (0, 1 or 2), that shows the distances where it lies, with
-    colours and iso-lines, wherever it is moved. Raises :class:`InputError` without a volume."""
+    colours and iso-lines, wherever it is moved. Raises :class:`InputError` without a volume that can be read."""
     field = _field(collection)
     size = np.array(field.data[materials.SIZE])
     obj = _object(f"{field.name} slice", _plane(size, axis), SLICE, collection, field)
@@ -72,13 +72,15 @@ def _field(collection):
     field = results.member(collection, results.FIELD)
     if field is None:
         raise InputError(f"{collection.name} has no volume: reconstruct again")
+    if _distances(field) is None:
+        raise InputError(f"{field.name} cannot be read from {volume_files.file_of(field.data)}: reconstruct again")
     return field
 
 
 def _distances(field):
-    """Name of the grid of distances, which says whether they are signed."""
+    """Name of the grid of distances, which says whether they are signed; None where the file is gone."""
     field.data.grids.load()
-    return next(grid.name for grid in field.data.grids if grid.name in {"udf", "sdf"})
+    return next((grid.name for grid in field.data.grids if grid.name in {"udf", "sdf"}), None)
 
 
 def _object(name, data, role, collection, parent):

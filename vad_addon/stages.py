@@ -144,7 +144,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         made_from = collection.get(results.SOURCE)
         name, uid = (made_from.name, made_from.session_uid) if made_from else (samples.name.removesuffix(" samples"), 0)
         self._source = Source(name, uid, points, attributes.read(samples.data), None)
-        self._collection = collection.session_uid
+        self._collection = collection.session_uid if results.is_editable(collection) else None
         field, volume = results.member(collection, results.FIELD), None
         same = collection.get(results.FIELD_OF) == stored_field.identity(near, axes, confidence, asdict(settings))
         if field is not None and same and stored_field.suffices(settings):
@@ -168,9 +168,9 @@ def _placed(scene, source, data, origin):
     """A new object, beside the one that its points come from."""
     obj = bpy.data.objects.new(data.name, data)
     obj.location = origin
-    beside = points_in.object_of(source)
-    homes = beside.users_collection if beside and beside.name in scene.objects else ()
-    (homes[0] if homes else scene.collection).objects.link(obj)
+    beside, of_scene = points_in.object_of(source), {scene.collection, *scene.collection.children_recursive}
+    homes = [home for home in beside.users_collection if home in of_scene] if beside else []
+    next(filter(results.is_editable, homes), scene.collection).objects.link(obj)
     return obj
 
 

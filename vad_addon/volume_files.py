@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import os
 import shutil
 import time
 from pathlib import Path
@@ -19,7 +20,8 @@ _QUITTING = 20.0  # seconds that Blender may take to quit
 _SUBFOLDER = "vad_cache"  # so that clearing it deletes nothing else
 _STAYS = "The volume stays in the cache folder: "
 _made = set()  # files of this session that may be out of use once its undo history is gone
-_copies = {}  # (file in the cache folder, folder beside a .blend): its copy there
+_copies = {}  # (file in the cache folder, when it was made, folder beside a .blend): its copy there
+_LONGEST = 200  # bytes of a file's name, of 255 that there may be, before its number
 _before = {}  # the volumes that the save under way brings along, by `session_uid`: what they read before
 
 
@@ -46,8 +48,9 @@ def used() -> set[Path]:
 
 
 def file_of(volume: bpy.types.Volume) -> Path:
-    """The .vdb file that `volume` reads."""
-    return Path(bpy.path.abspath(volume.filepath, library=volume.library)).resolve()
+    """The .vdb file that `volume` reads. Blender takes `..` for the folder that is written before it, even where that
+    is a link to another place."""
+    return Path(os.path.normpath(bpy.path.abspath(volume.filepath, library=volume.library))).resolve()
 
 
 @persistent
@@ -58,8 +61,8 @@ def bring_along(blend: str = "", *_) -> None:
     _before.clear()
     if not blend:
         return
-    folder, caches = Path(blend).resolve().parent / "vad", {cache_folder().resolve(), own_folder().resolve()}
-    here = bpy.data.is_saved and Path(bpy.data.filepath).resolve().parent == folder.parent
+    folder, caches = Path(blend).absolute().parent / "vad", {cache_folder().resolve(), own_folder().resolve()}
+    here = bpy.data.is_saved and Path(bpy.data.filepath).parent == folder.parent
     for volume in bpy.data.volumes:
         path = file_of(volume)
         if volume.library is not None or caches.isdisjoint(path.parents) or not path.is_file():
@@ -93,9 +96,10 @@ def put_back(*_) -> None:
 
 
 def _copy(path, folder):
-    copy = _copies.get((path, folder))
+    key = path, path.stat().st_mtime_ns, folder
+    copy = _copies.get(key)
     if copy is None or not copy.is_file():
-        copy = _copies[path, folder] = adopt(path.stem, path, folder)
+        copy = _copies[key] = adopt(path.stem, path, folder)
     return copy
 
 
@@ -139,9 +143,9 @@ def blender_path(path: Path) -> str:
 
 def _reserve(name, folder):
     """Create an empty file that nobody else uses. Names that exist already are counted up and never reused: an older
-    volume, an undone one or another .blend may read them."""
+    volume, an undone one or another .blend may read them. Names of objects may be longer than those of files."""
     folder = writable_folder(folder)
-    stem = bpy.path.clean_name(name)
+    stem = bpy.path.clean_name(name).encode()[:_LONGEST].decode(errors="ignore")
     path, number = folder / f"{stem}.vdb", 0
     while True:
         try:

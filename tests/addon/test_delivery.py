@@ -131,6 +131,32 @@ def test_materials_modifiers_and_places_survive(blender, run, scan):
     assert duplicate.data == made["surface"].data
 
 
+def test_an_object_whose_transforms_were_applied_is_placed_anew(blender, run, scan):
+    scan.location = 0, 0, 10
+    surface = run()["surface"]
+    for obj in blender.context.selected_objects:
+        obj.select_set(False)
+    surface.select_set(True)
+    blender.context.view_layer.objects.active = surface
+    blender.ops.object.transform_apply(location=True, rotation=True, scale=True)
+    assert surface.location.z == 0
+    surface = run()["surface"]
+    assert positions(surface.data).mean(axis=0)[2] + surface.location.z == pytest.approx(10, abs=0.05)
+
+
+def test_an_object_that_was_edited_stays_where_the_user_put_it(blender, run, scan):
+    surface = run()["surface"]
+    surface.location.x += 3
+    import bmesh
+
+    edited = bmesh.new()
+    edited.from_mesh(surface.data)
+    bmesh.ops.delete(edited, geom=[vertex for vertex in edited.verts if vertex.co.z > 0.5], context="VERTS")
+    edited.to_mesh(surface.data)
+    edited.free()
+    assert run()["surface"].location.x == pytest.approx(3, abs=1e-3)
+
+
 def test_results_follow_a_source_that_moved(run, scan):
     run()
     scan.location = 0, 0, 10

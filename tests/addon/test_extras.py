@@ -42,6 +42,55 @@ def test_without_a_volume_they_say_so(blender, result, operator):
         getattr(blender.ops.vad, operator)()
 
 
+@pytest.mark.parametrize("operator", ["shell", "slice"])
+def test_without_the_file_of_the_volume_they_say_so_and_leave_nothing(blender, result, tmp_path, operator):
+    blender.ops.wm.save_mainfile()
+    (tmp_path / "vad" / "Scan.vdb").unlink()
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    before = set(blender.data.objects), len(blender.data.node_groups)
+    with pytest.raises(RuntimeError, match=r"Scan field cannot be read from .*Scan\.vdb: reconstruct again"):
+        getattr(blender.ops.vad, operator)()
+    assert (set(blender.data.objects), len(blender.data.node_groups)) == before
+
+
+@pytest.mark.parametrize("how", ["excluded", "unlinked", "linked"])
+@pytest.mark.parametrize("operator", ["shell", "slice", "normals_to_geometry"])
+def test_results_that_take_no_more_objects_say_so(blender, result, tmp_path, operator, how):
+    collection, layer = blender.context.scene.vad.result, blender.context.view_layer
+    if how == "excluded":
+        layer.layer_collection.children[collection.name].exclude = True
+    elif how == "unlinked":
+        blender.context.scene.collection.children.unlink(collection)
+    else:
+        collection = linked(blender, tmp_path)
+    before = set(blender.data.objects)
+    with pytest.raises(RuntimeError, match="make it local" if how == "linked" else "include it in the outliner"):
+        getattr(blender.ops.vad, operator)()
+    assert set(blender.data.objects) == before
+
+
+def linked(bpy, folder):
+    """The results of the run, linked into another file, the surface active."""
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(folder / "scene.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Scan VAD"]
+    collection = bpy.data.collections["Scan VAD"]
+    bpy.context.scene.collection.children.link(collection)
+    bpy.context.view_layer.objects.active = collection.objects["Scan surface"]
+    return collection
+
+
+def test_what_is_extracted_again_of_linked_results_lies_beside_them(blender, result, tmp_path):
+    collection = linked(blender, tmp_path)
+    before = {obj.name: obj.data for obj in collection.objects}
+    assert blender.ops.vad.reextract(resolution=24) == {"FINISHED"}
+    assert {obj.name: obj.data for obj in collection.objects} == before
+    made = blender.context.scene.vad.result
+    assert made.library is None
+    assert {obj["vad_role"] for obj in made.objects} == {"samples", "surface", "field"}
+
+
 def test_a_shell_lies_at_its_distance_on_both_sides(blender, result):
     assert blender.ops.vad.shell(offset=3) == {"FINISHED"}
     shell = blender.context.active_object
@@ -245,6 +294,31 @@ def test_an_active_edge_gives_its_direction_though_the_object_is_stretched(blend
     _, axes = constraints(blender, extension)
     way = edited.matrix_world.to_3x3() @ (edge.verts[1].co - edge.verts[0].co)
     assert_allclose(np.abs(axes @ np.array(way.normalized())), 1, atol=1e-6)
+
+
+def test_the_axis_of_the_active_element_holds_for_all_meshes_that_are_edited(blender, extension, edited, add_mesh):
+    import bmesh
+
+    blender.ops.object.mode_set(mode="OBJECT")
+    other = add_mesh("Other", np.random.default_rng(0).random((20, 3)))
+    other.rotation_euler = 0, 0.5, 1
+    blender.context.view_layer.objects.active = edited
+    blender.context.view_layer.update()
+    blender.ops.object.mode_set(mode="EDIT")
+    for obj in (edited, other):
+        for vertex in bmesh.from_edit_mesh(obj.data).verts:
+            vertex.select = vertex.index < 3
+    mesh = bmesh.from_edit_mesh(edited.data)
+    mesh.verts.ensure_lookup_table()
+    edge = mesh.edges.new(mesh.verts[0:2])
+    mesh.select_history.add(edge)
+    blender.ops.vad.fix_axes(origin="ACTIVE")
+    indices, axes = constraints(blender, extension)
+    assert indices == [0, 1, 2, 500, 501, 502]
+    way = edited.matrix_world.to_3x3() @ (edge.verts[1].co - edge.verts[0].co)
+    assert_allclose(np.abs(axes @ np.array(way.normalized())), 1, atol=1e-6)
+    blender.ops.vad.free_axes()
+    assert constraints(blender, extension) is None
 
 
 def test_freed_axes_are_gone(blender, extension, edited):

@@ -68,6 +68,19 @@ def test_columns_named_as_blenders_own_leave_those_alone(blender, tmp_path):
     assert obj.data.attributes["weight"].data[1].value == 8
 
 
+def test_columns_that_points_cannot_have_in_blender_get_another_name(blender, tmp_path):
+    names = "material_index", "sharp_face", 40 * "long", "é" * 50
+    rows = ["x,y,z," + ",".join(names)] + [f"{k},{k * k},1,5,6,7,8" for k in range(9)]
+    (tmp_path / "scan.csv").write_text("\n".join(rows), encoding="utf-8")
+    blender.ops.vad.import_points(filepath=str(tmp_path / "scan.csv"))
+    obj = blender.context.active_object
+    found = {name for name in obj.data.attributes.keys() if name != "position" and not name.startswith(".")}
+    assert {"scan_material_index", "scan_sharp_face", (40 * "long")[:62]} <= found
+    assert all(len(obj.data.attributes[name].data) == 9 for name in found)
+    assert [value.value for value in obj.data.attributes["scan_material_index"].data] == [5] * 9
+    assert blender.ops.vad.reconstruct(resolution=16) == {"FINISHED"}
+
+
 def test_a_file_that_cannot_be_read_is_one_sentence_and_no_object(blender, tmp_path):
     (tmp_path / "bad.xyz").write_text("no numbers here\n")
     with pytest.raises(RuntimeError, match=r"bad\.xyz") as caught:

@@ -204,6 +204,48 @@ def test_only_what_is_selected_in_edit_mode(blender, gather, add_mesh, sphere, m
     assert len(gather(selected_only=True).points) == 500
 
 
+@pytest.mark.parametrize("how", ["object", "collection"])
+def test_what_is_disabled_is_told_and_not_read(blender, gather, extension, add_mesh, sphere, how):
+    points_in, scans = extension("vad_addon.points_in"), blender.data.collections.new("Scans")
+    blender.context.scene.collection.children.link(scans)
+    scan = add_mesh("Scan", sphere)
+    for home in scan.users_collection:
+        home.objects.unlink(scan)
+    scans.objects.link(scan)
+    blender.context.view_layer.objects.active = scan
+    blender.ops.vad.reconstruct(resolution=16)
+    scan.select_set(False)
+    blender.context.view_layer.objects.active = blender.data.objects["Scan surface"]
+    blender.data.objects["Scan surface"].select_set(True)
+    if how == "object":
+        scan.hide_viewport = True
+    else:
+        blender.context.view_layer.layer_collection.children["Scans"].exclude = True
+    blender.context.view_layer.update()
+    assert points_in.sources(blender.context) == [scan]
+    assert points_in.selection_problem(blender.context).startswith("Scan is disabled in viewports")
+    assert points_in.point_count([scan], blender.context) == 0
+    with pytest.raises(extension("core.errors").InputError, match="Scan is disabled in viewports"):
+        gather()
+    with pytest.raises(RuntimeError, match="Scan is disabled in viewports"):
+        blender.ops.vad.reconstruct(resolution=16)
+
+
+def test_of_two_objects_with_an_edited_mesh_both_are_edited(blender, extension, add, add_mesh, sphere):
+    points_in, axes = extension("vad_addon.points_in"), extension("vad_addon.axes")
+    scan = add_mesh("Scan", sphere)
+    twin = add("Twin", scan.data)
+    blender.context.view_layer.objects.active = scan
+    blender.ops.object.mode_set(mode="EDIT")
+    blender.ops.mesh.select_all(action="SELECT")
+    blender.ops.vad.fix_axes(origin="TYPED", axis=(0, 0, 1))
+    assert points_in.point_count([twin], blender.context) == 500
+    assert len(points_in.gather([twin], blender.context, selected_only=True).points) == 500
+    for obj in (scan, twin):
+        assert axes.held_by(obj)
+        assert_allclose(axes.read(obj)[1], np.tile([0, 0, 1], (500, 1)), atol=1e-6)
+
+
 def test_an_empty_selection_is_refused(blender, gather, add_mesh, sphere, extension):
     add_mesh("Scan", sphere)
     blender.ops.object.mode_set(mode="EDIT")

@@ -71,10 +71,24 @@ def test_scenes_start_with_what_the_user_prefers(blender, extension, stored, mon
             addons = {extension("vad_addon.volume_files").PACKAGE: Installed}
 
     monkeypatch.setattr(preferences.bpy, "context", Context, raising=False)
+    monkeypatch.setattr(preferences, "_given", {})
     preferences.prepare_scenes()
     assert (stored.resolution, stored.backend, stored.device) == (200, "numpy", "cpu")
     assert other.vad.resolution == 50
     assert not stored.is_property_set("memory_limit")
+    for Preferences.resolution in (201, 220, 256):  # as while a field is dragged
+        preferences.prepare_scenes()
+    assert stored.resolution == 256
+    stored.resolution = 99
+    Preferences.resolution = 300
+    preferences.prepare_scenes()
+    assert stored.resolution == 99
+
+
+def test_scenes_are_looked_at_when_they_are_made_and_loaded(blender, extension):
+    look, handlers = extension("vad_addon.preferences").prepare_scenes, blender.app.handlers
+    assert look in handlers.depsgraph_update_post
+    assert look in handlers.load_post
 
 
 def test_the_cache_folder_may_be_another(blender, extension, add_mesh, sphere, tmp_path, monkeypatch):

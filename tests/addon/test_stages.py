@@ -90,6 +90,37 @@ def test_the_strength_starts_from_the_setting_of_the_scene(blender, scan, denois
     assert np.median(moved / whole) == pytest.approx(share, abs=0.01)
 
 
+def test_beside_a_scan_that_is_linked_or_of_another_scene_they_go_into_this_scene(blender, add_mesh, sphere):
+    first, scan = blender.context.scene, add_mesh("Scan", sphere)
+    home = blender.data.collections.new("Of the first scene")
+    first.collection.children.link(home)
+    first.collection.objects.unlink(scan)
+    home.objects.link(scan)
+    second = blender.data.scenes.new("Second")
+    second.collection.objects.link(scan)
+    blender.context.window.scene = second
+    blender.context.view_layer.objects.active = scan
+    scan.select_set(True)
+    blender.ops.vad.denoise()
+    made = blender.data.objects["Scan cleaned"]
+    assert [home.name for home in made.users_collection] == [second.collection.name]
+
+
+def test_beside_a_scan_in_a_linked_collection_they_go_into_the_scene(blender, add_mesh, sphere, tmp_path):
+    scan = add_mesh("Scan", sphere)
+    scans = blender.data.collections.new("Scans")
+    scans.objects.link(scan)
+    blender.data.libraries.write(str(tmp_path / "scans.blend"), {scans})
+    blender.ops.wm.read_homefile(use_empty=True)
+    with blender.data.libraries.load(str(tmp_path / "scans.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Scans"]
+    blender.context.scene.collection.children.link(blender.data.collections["Scans"])
+    blender.context.view_layer.objects.active = blender.data.objects["Scan"]
+    for operator in (blender.ops.vad.denoise, blender.ops.vad.normals):
+        assert operator() == {"FINISHED"}
+    assert {"Scan cleaned", "Scan cleaned normals"} <= set(blender.context.scene.collection.objects.keys())
+
+
 def test_a_run_goes_on_from_the_cleaned_points(blender, scan):
     blender.ops.vad.denoise()
     blender.ops.vad.reconstruct(resolution=24, denoise="0")

@@ -115,6 +115,42 @@ def test_what_undo_brings_back_from_the_cache_comes_along_again(blender, unsaved
     assert names(tmp_path) == ["Scan.vdb"]
 
 
+def test_beside_a_file_saved_by_way_of_a_link_the_volume_stays(blender, unsaved, tmp_path):
+    (tmp_path / "far" / "off" / "place").mkdir(parents=True)
+    link = tmp_path / "link"
+    try:
+        link.symlink_to(tmp_path / "far" / "off" / "place")
+    except OSError:
+        pytest.skip("no symbolic links here")
+    blender.ops.wm.save_as_mainfile(filepath=str(link / "scene.blend"))
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    blender.ops.wm.read_homefile(use_empty=True)
+    assert names(link) == ["Scan.vdb"]
+    blender.ops.wm.open_mainfile(filepath=str(link / "scene.blend"))
+    assert blender.data.volumes["Scan field"].grids.load()
+
+
+def test_a_second_file_saved_beside_the_first_has_its_own_volume(blender, unsaved, add_mesh, sphere, tmp_path):
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "first.blend"))
+    blender.ops.wm.read_homefile(use_empty=True)
+    add_mesh("Scan", 2 * sphere)
+    blender.ops.vad.reconstruct(resolution=16)
+    made = Path(blender.data.volumes["Scan field"].filepath).read_bytes()
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "second.blend"))
+    assert names(tmp_path) == ["Scan.vdb", "Scan_001.vdb"]
+    assert blender.data.volumes["Scan field"].filepath == "//vad/Scan_001.vdb"
+    assert (tmp_path / "vad" / "Scan_001.vdb").read_bytes() == made
+
+
+@pytest.mark.parametrize("letter", ["a", "ä"])
+def test_a_name_too_long_for_a_file_is_shortened(files, tmp_path, letter):
+    (tmp_path / "field.vdb").write_bytes(b"a volume")
+    for _ in range(2):
+        path = files.adopt(255 * letter, tmp_path / "field.vdb", tmp_path / "vad")
+        assert path.read_bytes() == b"a volume"
+    assert len(names(tmp_path)) == 2
+
+
 def test_a_saved_copy_has_volumes_of_its_own(blender, unsaved, tmp_path):
     cached = unsaved.filepath
     blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"), copy=True)
