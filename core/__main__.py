@@ -1,13 +1,17 @@
 """`python -m core`."""
 
 import os
+import signal
 import sys
 
 from .exit_status import BAD_INPUT, CANCELLED
 
+if sys.stderr is None:  # closed
+    sys.stderr = open(os.devnull, "w")  # noqa: SIM115  until the end
 if sys.stdout is not None:
     sys.stdout.reconfigure(errors="backslashreplace")  # file names need not be text
 try:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     from .cli import main
 
     status = main()

@@ -21,9 +21,10 @@ from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
 from .field.grid import fit_grid
 from .io.atomic import writable_folder
 from .io.npz import write_arrays
+from .io.own_files import is_own
 from .io.ply import write_mesh, write_points
 from .io.points import READERS, read_points, read_scan
-from .io.report import report_json, scan_of_report, write_report
+from .io.report import report_json, report_of, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
 from .points import first_of_each, local_spacing, prepare_samples
@@ -212,14 +213,20 @@ def _reconstruct(given):
 
 
 def _spare(scan, folder, arrays):
-    """Raise :class:`InputError` where a file that is to be written is the scan itself, or a result of another scan."""
-    for ending in (_POINTS, _VOLUME, *_MESHES.values(), *([_ARRAYS] if arrays else []), _REPORT):
-        path = folder / f"{scan.stem}{ending}"
-        if path.exists() and path.samefile(scan):
+    """Raise :class:`InputError` where a file that is to be written is the scan itself, a result of another scan, or one
+    that this program did not make."""
+    endings = _POINTS, _VOLUME, *_MESHES.values(), *([_ARRAYS] if arrays else []), _REPORT
+    there = [path for path in (folder / f"{scan.stem}{ending}" for ending in endings) if path.exists()]
+    for path in there:
+        if path.samefile(scan):
             raise InputError(f"{path} would replace the scan, which is that file; give another folder for the results")
-    other = scan_of_report(folder / f"{scan.stem}{_REPORT}")
-    if other and Path(other).is_file() and not Path(other).samefile(scan):
+    report = report_of(folder / f"{scan.stem}{_REPORT}")
+    if report and (other := Path(report["scan"])).is_file() and not other.samefile(scan):
         raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
+    known = {Path(str(path)).name for path in report.get("files", ())}
+    for path in there:
+        if path.name not in known and not is_own(path):
+            raise InputError(f"{path} is there, and was not made by this program; give another folder for the results")
 
 
 @contextmanager

@@ -19,7 +19,7 @@ def named_columns(path, names: list[str]) -> dict[str, int]:
     are numbered from the second on. Raises :class:`InputError` for more columns without them."""
     columns = {}
     for column, name in enumerate(names):
-        columns[_not_among(columns, _plain(name) or f"column_{column + 1}")] = column
+        columns[not_among(columns, _plain(name) or f"column_{column + 1}")] = column
     if not XYZ.keys() <= columns.keys():
         if len(names) > 3:
             seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
@@ -61,7 +61,7 @@ def with_colours_in_bytes(attributes: dict[str, np.ndarray]) -> dict[str, np.nda
     return attributes
 
 
-def _not_among(taken, name):
+def not_among(taken, name: str) -> str:
     """The name, or the first of name_2, name_3, ... that is not among those taken."""
     tried = (f"{name}_{number}" if number > 1 else name for number in count(1))
     return next(each for each in tried if each not in taken)

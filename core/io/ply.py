@@ -13,6 +13,7 @@ from plyfile import PlyData, PlyElement
 from ..errors import InputError
 from ..surface.mesh import Mesh
 from .atomic import atomic_path
+from .own_files import MADE_BY
 
 _NAME = re.compile(r"[!-~]+")
 _TYPES = "i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"
@@ -95,4 +96,4 @@ def _column(name, values, count, taken):
 
 def _write(path, *elements):
     with atomic_path(path) as temporary:
-        PlyData(elements, byte_order="<").write(str(temporary))
+        PlyData(elements, byte_order="<", comments=[MADE_BY]).write(str(temporary))

@@ -9,10 +9,12 @@ import numpy as np
 from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
 
 from ..errors import InputError
+from .columns import not_among
 from .not_a_number import spelt_plainly
 
 _FIRST_LINE = re.compile(rb"(?:" + BOM_UTF8 + rb")?ply[ \t]*(\r\n|\n|\r)", re.IGNORECASE)
 _IGNORED = re.compile(rb"((comment|obj_info)\b.*)?", re.DOTALL)
+_NO_ASCII = re.compile(r"[^!-~]+")
 _ELEMENT = re.compile(rb"^(element[ \t]+\S+)[ \t]+(-?\d+)$", re.MULTILINE)
 
 
@@ -61,7 +63,8 @@ def _header(content):
     """What the header declares (elements without rows), their row counts, and where the data start.
 
     plyfile reads the header with every count set to zero, so that nothing is allocated before the counts are checked,
-    and without comments, which may be in any encoding, blank lines and blanks at the ends of lines.
+    and without comments, which may be in any encoding, blank lines and blanks at the ends of lines. What is no ASCII in
+    names becomes `_`, and a number tells names apart that are alike by that.
     """
     first = _FIRST_LINE.match(content)
     if not first:
@@ -71,7 +74,8 @@ def _header(content):
     if not last:
         raise ValueError("its header has no line 'end_header'; is it cut off?")
     lines = [line.strip() for line in content[first.end() : last.end()].split(newline)]
-    header = b"".join(line + b"\n" for line in (b"ply", *lines) if not _IGNORED.fullmatch(line))
+    lines = _in_ascii([b"ply", *(line for line in lines if not _IGNORED.fullmatch(line))])
+    header = b"".join(line + b"\n" for line in lines)
     counts = []
 
     def without_rows(match):
@@ -82,6 +86,17 @@ def _header(content):
     if len(counts) != len(layout) or min(counts, default=0) < 0:
         raise ValueError("an element of its header has no valid count")
     return layout, counts, last.end()
+
+
+def _in_ascii(lines):
+    taken = {line.split()[-1].decode() for line in lines if line.isascii() and line}
+    for line in lines:
+        if not line.isascii():
+            *kind, name = line.split()
+            name = not_among(taken, _NO_ASCII.sub("_", name.decode(errors="replace")))
+            taken.add(name)
+            line = b" ".join([*kind, name.encode()])
+        yield line
 
 
 def _smallest_row(element, layout):

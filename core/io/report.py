@@ -21,14 +21,13 @@ def write_report(path: str | os.PathLike, report: dict) -> None:
         temporary.write_text(report_json(report) + "\n", encoding="utf-8")
 
 
-def scan_of_report(path: str | os.PathLike) -> str | None:
-    """The scan that a report written as the file `path` is of; None where there is no such file, or another."""
+def report_of(path: str | os.PathLike) -> dict:
+    """The report of a scan that was written as the file `path`; empty where there is no such file, or another."""
     try:
         report = json.loads(Path(path).read_text("utf-8"))
     except (OSError, ValueError):
-        return None
-    scan = report.get("scan") if isinstance(report, dict) else None
-    return scan if isinstance(scan, str) else None
+        return {}
+    return report if isinstance(report, dict) and isinstance(report.get("scan"), str) else {}
 
 
 def _plain(value):

@@ -10,6 +10,7 @@ from ..field.blocks import each, node_gradient
 from ..field.distance_field import BandedField, DistanceField
 from .atomic import atomic_path
 from .openvdb_module import fill, load_openvdb
+from .own_files import MADE_BY
 
 _SMALLEST = 1.5e-5  # the cube of a voxel's size counts as zero below 3e-15
 _FOG_CELLS = 2.0  # the visible fog fades out at this distance from the surface
@@ -25,10 +26,14 @@ def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradi
     gradient : (only if asked) vectors along which the distance grows, unit-free, by central differences; within a band
                zero for its last cell
 
-    Raises :class:`MissingDependency` without OpenVDB, :class:`InputError` for cells smaller than it takes,
-    :class:`VADError` where the file cannot be written whole.
+    Raises :class:`MissingDependency` without OpenVDB, :class:`InputError` for cells smaller than it takes and for paths
+    that are no text, :class:`VADError` where the file cannot be written whole.
     """
     openvdb = load_openvdb()
+    try:
+        os.fspath(path).encode()
+    except UnicodeEncodeError as error:
+        raise InputError(f"{path} holds bytes that are no text, which OpenVDB does not take; rename it") from error
     if field.spacing < _SMALLEST:
         raise InputError(
             f"cells are {field.spacing:.2g} wide, and OpenVDB takes none smaller than {_SMALLEST:g}; give the points "
@@ -36,7 +41,7 @@ def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradi
         )
     grids = _grids(openvdb, field, gradient)
     with atomic_path(path) as temporary:
-        openvdb.write(str(temporary), grids=grids)
+        openvdb.write(str(temporary), grids=grids, metadata={"creator": MADE_BY})
         if not _is_whole(temporary, len(grids)):
             raise VADError(f"{path} cannot be written whole (disk full?); free space there or choose another folder")
 

@@ -257,11 +257,26 @@ def test_results_of_another_scan_of_that_name_stay(capsys, scan, calls, tmp_path
     assert run(capsys, "reconstruct", "ball.npy", "-o", "../out")[0] == 0
 
 
-def test_a_file_of_its_own_in_place_of_the_report_is_none_of_another_scan(capsys, scan, calls, tmp_path):
-    for text in ("[]", "{", '{"scan": 3}'):
-        (tmp_path / "out").mkdir(exist_ok=True)
-        (tmp_path / "out" / "ball.json").write_text(text)
-        assert run(capsys, "reconstruct", scan, "-o", tmp_path / "out")[0] == 0
+@pytest.mark.parametrize("ending", ["_points.ply", "_double.ply", "_signed.ply", ".vdb", ".npz", ".json"])
+def test_files_that_others_made_stay(capsys, scan, calls, tmp_path, ending):
+    path = tmp_path / f"ball{ending}"
+    path.write_bytes(b'{"scan": 3}')
+    message = refused(capsys, "reconstruct", scan, "-o", tmp_path, "--arrays")
+    assert f"{path} is there, and was not made by this program" in message
+    assert path.read_bytes() == b'{"scan": 3}'
+    assert not calls
+
+
+@pytest.mark.parametrize("surface", ["both", "signed"])
+def test_results_of_a_run_that_was_killed_before_its_report_are_replaced(capsys, scan, calls, tmp_path, surface):
+    arguments = "reconstruct", scan, "-o", tmp_path / "out", "--arrays", "--surface", surface
+    assert run(capsys, *arguments)[0] == 0
+    (tmp_path / "out" / "ball.json").unlink()
+    assert run(capsys, *arguments)[0] == 0
+    for path in (tmp_path / "out").iterdir():
+        if path.suffix != ".json":
+            path.write_bytes(b"older, and listed in the report")
+    assert run(capsys, *arguments)[0] == 0
 
 
 def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan, calls):
@@ -463,6 +478,21 @@ def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     assert os.listdir(tmp_path / "out") == []
 
 
+@pytest.mark.skipif(os.name != "posix", reason="Windows knows no such request")
+def test_a_request_to_end_while_modules_are_loaded_cancels(scan):
+    """`-X importtime` tells of each module when it is loaded; NumPy comes first of what takes its time."""
+    command = [sys.executable, "-X", "importtime", "-m", "core", "info", scan]
+    running = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    while line := running.stderr.readline():
+        if "core.exit_status" in line:
+            break
+    time.sleep(0.1)
+    running.send_signal(signal.SIGTERM)
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert err.splitlines()[-1] == "error: cancelled"
+
+
 @pytest.mark.parametrize("command", [["info"], ["reconstruct", "-o", "out"]])
 def test_a_thread_may_run_it(scan, calls, capsys, command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -491,3 +521,24 @@ def test_no_standard_output_is_none_needed(scan):
         f"{sys.executable} -m core info {scan} >&-", shell=True, cwd=ROOT, capture_output=True, text=True, timeout=60
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="closes a file of the shell")
+def test_no_standard_error_is_none_needed(scan, tmp_path):
+    command = f"{sys.executable} -m core reconstruct {scan} -o {tmp_path}/out --resolution 16 --json 2>&-"
+    done = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0
+    assert len(json.loads(done.stdout)["files"]) == 4
+    done = subprocess.run(f"{command} --outliers=3", shell=True, cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert "--outliers" in json.loads(done.stdout)["error"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have text alone for names")
+def test_into_a_folder_whose_name_is_no_text_goes_all_but_the_volume(scan, tmp_path):
+    folder = os.path.join(os.fsencode(tmp_path), b"o\xff")
+    command = [os.fsencode(sys.executable), b"-m", b"core", b"reconstruct", scan.encode(), b"-o", folder]
+    done = subprocess.run([*command, b"--resolution", b"16"], cwd=ROOT, capture_output=True, timeout=60)
+    assert done.returncode == 0
+    assert sorted(os.listdir(folder)) == [b"ball.json", b"ball_double.ply", b"ball_points.ply"]
+    assert b"holds bytes that are no text" in done.stderr

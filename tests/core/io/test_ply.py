@@ -37,8 +37,9 @@ def test_the_bytes_are_those_the_format_prescribes(folder):
     mesh = Mesh(np.array([[0.1, 0.2, 0.3]] * 3), np.array([[0, 1, 2]], np.int32))
     write_mesh(folder / "mesh.ply", mesh)
     header = (
-        b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
-        b"property double z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        b"ply\nformat binary_little_endian 1.0\ncomment made by VAD (Voronoi-Assisted Diffusion)\n"
+        b"element vertex 3\nproperty double x\nproperty double y\nproperty double z\n"
+        b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
     )
     body = struct.pack("<3d", 0.1, 0.2, 0.3) * 3 + struct.pack("<B3i", 3, 0, 1, 2)
     assert (folder / "mesh.ply").read_bytes() == header + body

@@ -109,6 +109,16 @@ def test_line_ends_comments_and_objects_in_the_header(folder, newline, form):
     np.testing.assert_array_equal(read_points(written(folder, content)), points)
 
 
+@pytest.mark.parametrize("form", FORMATS)
+def test_names_that_are_not_in_ascii_are_written_so(folder, form):
+    content = ply([vertices(np.eye(3), extra=(("height", "f4"), ("hight", "f4")))], **FORMATS[form])
+    for name, other in ((b" height", "scalar_Höhe".encode()), (b" hight", "scalar_Hähe".encode("latin-1"))):
+        content = content.replace(name, b" " + other)
+    points, found = read_scan(written(folder, content))
+    assert np.array_equal(points, np.eye(3))
+    assert list(found) == ["scalar_H_he", "scalar_H_he_2"]
+
+
 @pytest.mark.parametrize("others", [[], [faces(3)]])
 @pytest.mark.parametrize("form", FORMATS)
 def test_truncation_within_the_vertices_is_refused(folder, form, others):

@@ -118,6 +118,17 @@ def test_colours_that_are_no_bytes_stay_what_they_are(folder):
         np.testing.assert_array_equal(carried["red"], [red])
 
 
+@pytest.mark.parametrize(
+    "text", ["Point Id X Y Z Intensity\n1 .5 .6 .7 100\n2 1.5 1.6 1.7 90\n", "Scan Pos X Y Z\n7 1 2 3\n8 4 5 6\n"]
+)
+def test_names_with_blanks_between_blanks_are_refused(folder, text):
+    (folder / "scan.txt").write_text(text)
+    with pytest.raises(InputError, match=r"names \d columns .*, but has \d; give names without blanks"):
+        read_points(folder / "scan.txt")
+    (folder / "scan.txt").write_text(text.replace(" Id", "_Id").replace(" Pos", "_Pos"))
+    assert read_points(folder / "scan.txt").shape == (2, 3)
+
+
 def test_no_points_but_names(folder):
     assert "holds no points" in refusal(folder, "scan.csv", "x,y,z,intensity\n")
 

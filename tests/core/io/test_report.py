@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from core.io.report import report_json, scan_of_report, write_report
+from core.io.report import report_json, report_of, write_report
 
 leaves = st.one_of(st.none(), st.booleans(), st.integers(), st.text(), st.floats())
 reports = st.recursive(leaves, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=8)
@@ -48,9 +48,9 @@ def test_numpy_values_paths_and_infinities(tmp_path):
 
 def test_the_scan_of_a_report_is_read_back(tmp_path):
     path = tmp_path / "report.json"
-    assert scan_of_report(path) is None
+    assert report_of(path) == {}
     write_report(path, {"scan": tmp_path / "b.ply"})
-    assert scan_of_report(path) == str(tmp_path / "b.ply")
+    assert report_of(path)["scan"] == str(tmp_path / "b.ply")
     for other in ('{"scan": 3}', "[]", "{", "\udcff"):
         path.write_bytes(other.encode("utf-8", "surrogateescape"))
-        assert scan_of_report(path) is None
+        assert report_of(path) == {}
