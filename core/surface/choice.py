@@ -54,7 +54,7 @@ class Choice:
         """The single layer for users, the number of its edges that cannot be wound alike, and :func:`misfit` of it."""
         found = self.single.told_apart()
         sheet, unoriented = found.with_thin_walls()
-        fit = found.fit if sheet is found.sheet[0] else misfit(sheet, self.local, self.grid.spacing)
+        fit = found.misfit if sheet is found.sheet[0] else misfit(sheet, self.local, self.grid.spacing)
         return sheet, unoriented, fit
 
     @property
@@ -73,7 +73,7 @@ class Choice:
         """:func:`misfit` of the double cover."""
         if not self.is_of_sheet:
             return self.extracted_fit
-        return misfit(self.cover, self.local, self.grid.spacing) if self.meetings.side_by_side else self.single.fit
+        return misfit(self.cover, self.local, self.grid.spacing) if self.meetings.side_by_side else self.single.misfit
 
     @cached_property
     def is_of_sheet(self) -> bool:
@@ -82,7 +82,7 @@ class Choice:
         """
         looked = self._may_be_sheet()
         if looked and self._is_whole():
-            (worst, _), _ = side_by_side(lambda: self.single.fit, lambda: self.both_sides)
+            (worst, _), _ = side_by_side(lambda: self.single.misfit, lambda: self.both_sides)
             if worst <= (ROUGH if self.meetings.side_by_side else 1):
                 return True
         return (looked or self._is_rough()) and self._is_closer()

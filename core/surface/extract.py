@@ -14,7 +14,7 @@ from .choice import SPARSEST, Choice
 from .double.double_cover import CLAMP, SPARSE, level_for
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
-from .meshing.misfit import OFF
+from .meshing.misfit import OFF, misfit
 from .meshing.pieces import without_small_pieces
 from .signed import signed_distance
 from .signs.sides import needed_band
@@ -126,6 +126,13 @@ def extract_surfaces(
         values = signed_distance(values, sides, local, place)
         part = progress.part(0.6, 1.0, "signed surface")
         meshes["signed"] = boundary_of_inside(values, meetings, local, grid, lambda: choice.extracted, part)
+        worst, missed = misfit(meshes["signed"], local, grid.spacing)
+        if missed > _SOME:
+            warnings.append(_said_of_missed(missed, "signed surface", "one of them is missing"))
+        elif worst > 1:
+            warnings.append(
+                "the signed surface is torn, as where walls run closer than the grid's cells; raise the resolution"
+            )
         if not sides.complete:
             warnings.append(
                 f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "

@@ -11,6 +11,7 @@ from ..field.blocks import Blocks, each
 from ..field.grid import Grid
 from ..field.local_surface import LocalSurface
 from ..progress import Progress
+from ..settings import options
 from .mesh import Mesh
 from .meshing.evening import evened
 from .meshing.finishing import finished
@@ -79,10 +80,12 @@ def _refusal(sides, surface, place):
             f"one-sided surfaces have, for instance near {_text(place(sides.alike[:1])[0])}; ask for surface='single'"
         )
     widest = np.where(border, surface.rims.opening, np.inf).argmin()
+    raised = surface.bridge < options()["bridge"].metadata["limits"][1]
+    close = f"raise bridge (now {surface.bridge:g}) until its holes close" if raised else "close its holes"
     return (
         f"the shape is not closed: the outside reaches both faces of {sides.share:.0%} of its surface, past "
         f"{border.sum()} border samples, for instance near {_text(place(surface.points[[widest]])[0])}; ask for "
-        f"surface='single', or raise bridge (now {surface.bridge:g}) until its holes close"
+        f"surface='single', or {close}"
     )
 
 

@@ -12,6 +12,7 @@ _ASKEW = 0.1  # of its area, the same where faces are turned away from the sampl
 OFF = 0.5  # cells off a mesh, where a sample is missed
 _FACES = 4  # that a sample may belong to
 _ASKED = 4096  # samples or faces, evenly picked out of more
+_NO_AREA = 1e-9  # of the square of a mesh's size, twice the area of one that has none
 _TURNED = np.cos(np.pi / 4)
 
 
@@ -60,9 +61,11 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
 def askew(mesh: Mesh, tree: KDTree, normals: np.ndarray) -> float:
     """Share of the area of the mesh, of 4096 and more of its faces, that is turned by more than 45 degrees from the
-    normal of the nearest sample, of those in the `tree` with `normals` (n,3); 1 for a mesh without faces."""
+    normal of the nearest sample, of those in the `tree` with `normals` (n,3); 1 for a mesh without area."""
     corners = np.stack(at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)]))
     normal = face_normals(*corners)
     area, nearest = lengths(normal), tree.query(corners.mean(axis=0).T, workers=-1)[1]
-    total = area.sum()
-    return float(area[np.abs(dots(normal, normals[nearest].T)) < _TURNED * area].sum() / total) if total else 1.0
+    total, turned = area.sum(), np.abs(dots(normal, normals[nearest].T)) < _TURNED * area
+    if not len(area) or total <= _NO_AREA * np.ptp(mesh.vertices, axis=0).max() ** 2:
+        return 1.0
+    return float(area[turned].sum() / total)

@@ -129,15 +129,9 @@ class SingleLayer:
         return misfit(self.sheet[0], self.local, self.grid.spacing)
 
     @property
-    def fit(self) -> tuple[float, float]:
-        """The same, but 0 where it bounds the inside and no sheets run side by side, as in thin walls."""
-        plain = self.sides.complete and not self.crossings.meetings.side_by_side
-        return (0.0, 0.0) if plain else self.misfit
-
-    @property
     def is_rough(self) -> bool:
         """Whether sheets run side by side, and it goes to and fro between them."""
-        return self.meetings.side_by_side and self.fit[0] > ROUGH
+        return self.meetings.side_by_side and self.misfit[0] > ROUGH
 
     def told_apart(self) -> "SingleLayer":
         """This, or where it is rough, the one with sheets told apart by their room: if its misfit is less than half of

@@ -1,5 +1,6 @@
 """Signed distance of closed shapes against closed forms, and the refusal of others."""
 
+import re
 from dataclasses import replace
 
 import igl
@@ -136,6 +137,22 @@ def test_raising_bridge_closes_a_hole():
     run = signed(points, bridge=10.0)
     assert shapes.euler(run.surface) == 2
     assert shapes.signed_volume(run.surface) == pytest.approx(4 / 3 * np.pi, rel=0.02)
+
+
+def test_raising_bridge_is_not_advised_beyond_its_most():
+    cap = shapes.sphere(1500)
+    with pytest.raises(InputError, match="or close its holes"):
+        reconstruct(cap[cap[:, 2] < 0.6], Settings(resolution=32, surface="signed", bridge=20))
+
+
+@pytest.mark.parametrize(("inner", "said"), [(0.97, "one of them is missing"), (0.94, "torn|missing|same side")])
+def test_walls_thinner_than_a_cell_that_are_lost_are_told(inner, said):
+    ball = np.concatenate([shapes.sphere(1500), shapes.sphere(1300, inner)])
+    try:
+        warnings = reconstruct(ball, Settings(resolution=64, surface="signed")).report["warnings"]
+    except InputError as error:
+        warnings = [str(error)]
+    assert any(re.search(said, warning) for warning in warnings)
 
 
 def test_a_spanned_opening_is_smooth():

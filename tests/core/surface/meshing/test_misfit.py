@@ -90,3 +90,8 @@ def test_no_faces_are_infinitely_far():
     surface = SimpleNamespace(points=np.zeros((1, 3)), project=onto_the_ground)
     assert chamfer(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), surface, 1.0) == np.inf
     assert chamfer(Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32)), surface, 1.0) == np.inf
+
+
+def test_a_mesh_without_area_is_turned_away_from_all():
+    mesh = Mesh(np.array([[0, 0, 0], [1, 0, 0], [2, 1e-14, 0]]), np.array([[0, 1, 2]], np.int32))
+    assert askew(mesh, KDTree(mesh.vertices), np.tile([0.0, 0, 1], (3, 1))) == 1
