@@ -97,13 +97,14 @@ def _columns(path, header, comment, values):
     the names are the file's. A comment before it that names as many as there are is a header, as other programs write
     it."""
     names = _split(_UNIT.sub("", comment if header is None else header))
-    if header is not None and _delimiter(header) is None and len(names) > len(values) > 0:
+    named = header is not None or (len(names) == len(values) and XYZ.keys() <= {name.lower() for name in names})
+    columns = named_columns(path, names) if named else unnamed_columns(path, values)
+    shifted = len(names) > len(values) > 0 and max(columns[axis] for axis in XYZ) > 2
+    if named and shifted and _delimiter(header or comment) is None:
         raise InputError(
             f"{path} names {len(names)} columns ({' '.join(names[:8])}), but has {len(values)}; give names without "
             "blanks, or part them by commas"
         )
-    named = header is not None or (len(names) == len(values) and XYZ.keys() <= {name.lower() for name in names})
-    columns = named_columns(path, names) if named else unnamed_columns(path, values)
     kept = {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and _is_number(values[c]))}
     return kept, named
 

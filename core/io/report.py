@@ -27,7 +27,8 @@ def report_of(path: str | os.PathLike) -> dict:
         report = json.loads(Path(path).read_text("utf-8"))
     except (OSError, ValueError):
         return {}
-    return report if isinstance(report, dict) and isinstance(report.get("scan"), str) else {}
+    sound = isinstance(report, dict) and isinstance(report.get("scan"), str)
+    return report if sound and isinstance(report.get("files", []), list) else {}
 
 
 def _plain(value):

@@ -125,6 +125,8 @@ def test_names_with_blanks_between_blanks_are_refused(folder, text):
     (folder / "scan.txt").write_text(text)
     with pytest.raises(InputError, match=r"names \d columns .*, but has \d; give names without blanks"):
         read_points(folder / "scan.txt")
+    (folder / "scan.txt").write_text("X Y Z in metres\n1 2 3\n4 5 6\n")
+    assert read_points(folder / "scan.txt").tolist() == [[1, 2, 3], [4, 5, 6]]
     (folder / "scan.txt").write_text(text.replace(" Id", "_Id").replace(" Pos", "_Pos"))
     assert read_points(folder / "scan.txt").shape == (2, 3)
 

@@ -51,6 +51,6 @@ def test_the_scan_of_a_report_is_read_back(tmp_path):
     assert report_of(path) == {}
     write_report(path, {"scan": tmp_path / "b.ply"})
     assert report_of(path)["scan"] == str(tmp_path / "b.ply")
-    for other in ('{"scan": 3}', "[]", "{", "\udcff"):
+    for other in ('{"scan": 3}', '{"scan": "b.ply", "files": 3}', "[]", "{", "\udcff"):
         path.write_bytes(other.encode("utf-8", "surrogateescape"))
         assert report_of(path) == {}
