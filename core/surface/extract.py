@@ -18,7 +18,7 @@ from .meshing.misfit import OFF, misfit
 from .meshing.pieces import without_small_pieces
 from .signed import signed_distance
 from .signs.sides import needed_band
-from .single.routes import boundary_of_inside
+from .single.routes import BETTER, boundary_of_inside
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said
@@ -129,7 +129,7 @@ def extract_surfaces(
         worst, missed = misfit(meshes["signed"], local, grid.spacing)
         if missed > _SOME:
             warnings.append(_said_of_missed(missed, "signed surface", "one of them is missing"))
-        elif worst > 1:
+        elif worst > 1 and choice.extracted_fit[0] < BETTER * worst:
             warnings.append(
                 "the signed surface is torn, as where walls run closer than the grid's cells; raise the resolution"
             )

@@ -74,7 +74,7 @@ def test_columns_that_points_cannot_have_in_blender_get_another_name(blender, tm
     (tmp_path / "scan.csv").write_text("\n".join(rows), encoding="utf-8")
     blender.ops.vad.import_points(filepath=str(tmp_path / "scan.csv"))
     obj = blender.context.active_object
-    found = {name for name in obj.data.attributes if name != "position" and not name.startswith(".")}
+    found = {each.name for each in obj.data.attributes if each.name != "position" and not each.name.startswith(".")}
     assert {"scan_material_index", "scan_sharp_face", (40 * "long")[:62]} <= found
     assert all(len(obj.data.attributes[name].data) == 9 for name in found)
     assert [value.value for value in obj.data.attributes["scan_material_index"].data] == [5] * 9

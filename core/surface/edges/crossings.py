@@ -31,7 +31,7 @@ from .mending import mend, odd_faces
 
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
 _SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
-_HAIR = np.array([0.014, 0.01, 0.006])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
+_HAIR = np.array([0.014, 0.01, 0.007])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
 _TURNED = 8  # steps along edges from odd faces, up to where edges are turned over
 _CHUNK = 1 << 15  # cells
 
