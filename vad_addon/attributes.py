@@ -39,7 +39,7 @@ class Attribute:
 def read(data) -> dict[str, Attribute]:
     """Every attribute that each point of `data` carries, by name, its position and Blender's internal ones left out."""
     return {
-        attribute.name: Attribute(attribute.data_type, _values(attribute))
+        attribute.name: Attribute(attribute.data_type, values(attribute))
         for attribute in data.attributes
         if attribute.domain == "POINT"
         and attribute.data_type in _LAYOUT
@@ -84,7 +84,7 @@ def join(parts: list[tuple[int, dict[str, Attribute]]]) -> dict[str, Attribute]:
         for name, attribute in attributes.items():
             kinds.setdefault(name, attribute.kind)
 
-    def values(name, kind, count, attributes):
+    def of_part(name, kind, count, attributes):
         found = attributes.get(name)
         if found is not None and found.kind == kind:
             return found.values
@@ -92,13 +92,14 @@ def join(parts: list[tuple[int, dict[str, Attribute]]]) -> dict[str, Attribute]:
         return np.zeros((count, width) if width > 1 else count, dtype)
 
     return {
-        name: Attribute(kind, np.concatenate([values(name, kind, *part) for part in parts]))
+        name: Attribute(kind, np.concatenate([of_part(name, kind, *part) for part in parts]))
         for name, kind in kinds.items()
     }
 
 
-def _values(attribute: bpy.types.Attribute):
+def values(attribute: bpy.types.Attribute) -> np.ndarray:
+    """Those of all elements, (n,) or (n,width)."""
     name, width, dtype = _LAYOUT[attribute.data_type]
-    values = np.empty((len(attribute.data), width), dtype)
-    attribute.data.foreach_get(name, values.ravel())
-    return values if width > 1 else values[:, 0]
+    found = np.empty((len(attribute.data), width), dtype)
+    attribute.data.foreach_get(name, found.ravel())
+    return found if width > 1 else found[:, 0]

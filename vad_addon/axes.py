@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from . import attributes
 from .points_in import AXIS
 
 
@@ -24,7 +25,7 @@ def read(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
         both = np.array(held, np.float64).reshape(-1, 2, 3)
         points, axes = both[:, 0], both[:, 1]
     else:
-        points, axes = (_vectors(obj.data.attributes[name]) for name in ("position", AXIS))
+        points, axes = (attributes.values(obj.data.attributes[name]) for name in ("position", AXIS))
         held = axes.any(axis=1)
         points, axes = points[held], axes[held]
     return points, axes / np.linalg.norm(axes, axis=1, keepdims=True)
@@ -61,9 +62,3 @@ def of_active(obj: bpy.types.Object) -> np.ndarray:
     if not axis.any():
         raise InputError("The active element has no axis: make a face, an edge or a point with a fixed axis active")
     return axis
-
-
-def _vectors(attribute):
-    flat = np.empty(3 * len(attribute.data), np.float32)
-    attribute.data.foreach_get("vector", flat)
-    return flat.reshape(-1, 3)

@@ -44,13 +44,6 @@ def pointcloud_data(name: str, points, origin, attributes: dict[str, Attribute])
     return cloud
 
 
-def positions(data: bpy.types.Mesh | bpy.types.PointCloud) -> np.ndarray:
-    """(n,3) float32, of vertices or points."""
-    points = np.empty((data.attributes.domain_size("POINT"), 3), np.float32)
-    data.attributes["position"].data.foreach_get("vector", points.ravel())
-    return points
-
-
 def volume_data(name: str, path: Path, active: str) -> bpy.types.Volume:
     """A volume that reads the .vdb at `path` and shows its grid `active`."""
     volume = bpy.data.volumes.new(name)

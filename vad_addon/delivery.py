@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import VADError
-from . import datablocks, materials, overlay, results, shapes, stored_field, volume_files
+from . import attributes, datablocks, materials, overlay, results, shapes, stored_field, volume_files
 from .attributes import Attribute
 from .outcome import Outcome
 from .points_in import Source, object_of
@@ -147,7 +147,7 @@ def _place(collection, role, data, origin):
 
 
 def _box(data):
-    points = datablocks.positions(data)
+    points = attributes.values(data.attributes["position"])
     ends = (points.min(axis=0), points.max(axis=0)) if len(points) else ()
     return [float(len(points)), *(float(x) for end in ends for x in end)]
 

@@ -149,7 +149,7 @@ def _components(evaluated, geometry, selected_only):
         yield _values(geometry.mesh.vertices, "co", np.float32, 3), attributes.read(geometry.mesh)
     for cloud in filter(_has_points, (geometry.pointcloud, geometry.curves)):
         flags = _cloud_selection(cloud) if selected_only else None
-        yield _picked(_values(cloud.attributes["position"].data, "vector", np.float32, 3), cloud, flags)
+        yield _picked(attributes.values(cloud.attributes["position"]), cloud, flags)
     instances = geometry.instances_pointcloud()
     if _has_points(instances):  # their "position" is uninitialised memory in Blender 4.5 and 5.0
         yield _values(instances.attributes["instance_transform"].data, "value", np.float32, 16)[:, 12:15], {}
