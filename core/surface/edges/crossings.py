@@ -32,6 +32,7 @@ from .mending import mend, odd_faces
 _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farther one is past its rim
 _SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
+_LEVEL = 0.99  # cosine between the normal of a sheet and an axis of the grid from which on it is level with it
 _TURNED = 8  # steps along edges from odd faces, up to where edges are turned over
 _CHUNK = 1 << 15  # cells
 
@@ -80,7 +81,7 @@ def find_crossings(
     progress(0.4)
     lowest, corner = band.whole_cells(np.arange(len(band.node)))
     once, twice = (each[_in_whole_cells(band, lowest, meet.edge[each])] for each in _once(meet))
-    edge, vote, share = _vote(band, corner, grid, progress.part(0.4, 0.5))
+    edge, vote, share = _vote(band, corner, surface, grid, progress.part(0.4, 0.5))
     alone = _may_be_covered(band, edge, share, grid)
     alone[np.isin(edge, meet.zone, kind="table")] = False
     alone = np.flatnonzero(alone)
@@ -161,10 +162,10 @@ def _in_whole_cells(band, lowest, edge):
     return whole[row] & whole[back] & whole[band.behind[second, back]] & whole[band.behind[second, row]]
 
 
-def _vote(band, corner, grid, progress):
+def _vote(band, corner, surface, grid, progress):
     """Edges of cells with corners (8,c), (e,) ascending, votes that they are crossed, positive if so, (e,), and which
     share of each is likely below the surface, (e,)."""
-    steps = np.ascontiguousarray(band.step.T)
+    steps = np.ascontiguousarray(_off_surface(band, surface, grid).T)
     chunks = even_chunks(corner.shape[1], _CHUNK, progress)
     cast = in_order(lambda part: _ballots(steps.take(corner[:, part], axis=1), grid.spacing), chunks)
     ballots = zip((np.empty((12, 0)),) * 3, *(found for _, found in cast), strict=True)
@@ -175,10 +176,19 @@ def _vote(band, corner, grid, progress):
     return voted, vote[voted], share[voted] / weight[voted]
 
 
+def _off_surface(band, surface, grid):
+    """The steps to the nodes, (b,3), from a hair off the surface, so that no node lies on it. Next to sheets level with
+    the grid, which whole layers of nodes may lie on, the hair goes across the sheet: the cells along a crease, whose
+    normal is of neither wall, see a node on the side that the walls' own cells see it on."""
+    hair, normals = grid.spacing * _HAIR, surface.normals[band.sample]
+    level = (np.abs(normals).max(axis=1) > _LEVEL)[:, None]
+    return band.step + np.where(level, (normals @ hair)[:, None] * normals, hair)
+
+
 def _ballots(step, cell):
     """For each edge of cells with steps (3,8,c) to their corners, the vote that it is crossed, how certain that is, and
     where along it the surface is, times that; (12,c) each."""
-    side = _sides(step + cell * _HAIR[:, None, None])
+    side = _sides(step)
     low, high = side[_EDGES[:, 0]], side[_EDGES[:, 1]]
     parted, below, above = (low >= 0) != (high >= 0), np.abs(low), np.abs(high)
     certain = np.minimum(below, above) + 1e-9 * cell

@@ -188,6 +188,33 @@ def test_a_sheet_level_with_the_grid_in_places_does_not_touch_itself():
     assert (shapes.euler(sheet), sheet.border_loops()) == (1, 1)
 
 
+def wall(corner, u, v, n, seed):
+    """Scattered points of a parallelogram."""
+    share = np.random.default_rng(seed).random((n, 2))
+    return np.asarray(corner) + share @ np.array([u, v], float)
+
+
+@pytest.mark.parametrize("resolution", [40, 50, 60])
+def test_a_cube_whose_sides_lie_on_nodes_is_one_piece(resolution):
+    """With these resolutions they do, so that each node there may be taken for in or out."""
+    run = reconstruct(shapes.scattered_box(2000, [2, 2, 2]), Settings(resolution=resolution, surface="both"))
+    assert (run.sheet.edge_counts()[1] == 2).all()
+    assert shapes.euler(run.sheet) == 2
+    assert len(shapes.components(run.surface)) == 2
+    assert shapes.euler(run.surface) == 4
+    assert shapes.signed_volume(run.sheet) == pytest.approx(8, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_whose_middle_wall_lies_on_nodes_is_one_sheet(seed):
+    parts = [([0, 0, 0], [1, 0, 0], [0, 2, 0]), ([1, 0, 0], [0, 2, 0], [0, 0, 1]), ([1, 0, 1], [1, 0, 0], [0, 2, 0])]
+    points = np.concatenate([wall(*part, 900, 3 * seed + k) for k, part in enumerate(parts)])
+    run = reconstruct(points, Settings(resolution=64, surface="both"))
+    assert (run.sheet.edge_counts()[1] <= 2).all()
+    assert (shapes.euler(run.sheet), run.sheet.border_loops()) == (1, 1)
+    assert shapes.euler(run.surface) == 2
+
+
 def hollow_box(wall):
     return np.concatenate([shapes.scattered_box(1800, [2, 2, 2]), shapes.scattered_box(1200, [2 - 2 * wall] * 3)])
 
