@@ -29,6 +29,7 @@ _AGREED = 0.6  # share of its neighbours that speak for the axis of a sample on 
 _GAIN = 0.1  # by which that share must rise
 _FEWEST = 4.0  # neighbours that must speak for the new axis
 _STEEP, _FLAT = 0.12, 0.05  # mean sines at which neighbours rise out of the plane of the old axis, and of the new one
+_UPRIGHT = 0.97  # confidence, below which axes may lean on those of another sheet
 _LEAST_TURN = 0.2  # radians
 _ROUNDS, _SWEEPS = 4, 6
 _ACROSS = 0.2  # sine between axis and image, from which neighbours beside a crease are on different sheets
@@ -52,7 +53,8 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            normals, flat = onto_planes(points, spacing, tree, normals, agreed_share(here, normals, fixed)[1])
+            beside, leaning = agreed_share(here, normals, fixed)[1], (mirrors.confidence(normals) < _UPRIGHT) & ~fixed
+            normals, flat = onto_planes(points, spacing, tree, normals, beside, leaning)
             normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)
             if not (flat | bent).any():
                 break

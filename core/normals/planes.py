@@ -17,7 +17,7 @@ _NEIGHBOURS = 20  # of a sample, that may lie on its sheet
 _WIDTH = 1.7  # of the Gaussian of their distance, local spacings
 _NEAREST = 8  # pairs of these and the sample make the planes that are tried
 _WEDGE = 0.3  # least sine of the angle between two
-_INSIDE = 0.007  # of the Gaussian of the sine by which neighbours rise out of a plane
+_INSIDE, _EXACTLY = 0.007, 0.001  # of the Gaussian of the sine by which neighbours rise out of a plane
 _SHARE = 0.35  # least share of the neighbours, by weight, in a plane
 _GAIN = 0.1  # by which it must exceed the share in that of the present axis
 _FEWEST = 6.0  # neighbours that must lie in it
@@ -33,16 +33,18 @@ def neighbourhoods(row, points, spacing, tree: KDTree):
     return other, direction, np.exp(-((distance / (_WIDTH * spacing[row, None])) ** 2))
 
 
-def onto_planes(points, spacing, tree: KDTree, normals, suspect):
+def onto_planes(points, spacing, tree: KDTree, normals, suspect, leaning):
     """The axes (n,3) after those of samples `suspect` (n,) bool are taken to the plane in which most of their
-    neighbours lie, where there are enough; and which these are, (n,) bool.
+    neighbours lie, where there are enough, and those of others `leaning` (n,) bool where these lie in it more exactly;
+    and which these are, (n,) bool.
 
     points : (n,3) float64     spacing : (n,) local spacing     tree : of the points     normals : (n,3) unit axes
     """
     turned, moved = normals.copy(), np.zeros(len(points), bool)
-    look = partial(_fullest, points=points, spacing=spacing, tree=tree, normals=normals)
-    for row, (axes, founded) in in_order(look, parts_of(suspect)):
-        turned[row[founded]], moved[row[founded]] = axes[founded], True
+    for chosen, inside in ((suspect, _INSIDE), (leaning & ~suspect, _EXACTLY)):
+        look = partial(_fullest, points=points, spacing=spacing, tree=tree, normals=normals, within=inside)
+        for row, (axes, founded) in in_order(look, parts_of(chosen)):
+            turned[row[founded]], moved[row[founded]] = axes[founded], True
     return turned, moved
 
 
@@ -52,9 +54,9 @@ def parts_of(chosen):
     return np.split(row, range(_CHUNK, len(row), _CHUNK))
 
 
-def _fullest(row, points, spacing, tree, normals):
+def _fullest(row, points, spacing, tree, normals, within):
     """Axes (r,3) of the planes through samples `row` (r,) with most of their neighbours in them, and whether these are
-    enough, (r,) bool."""
+    enough, (r,) bool; `within` such a Gaussian of the sine."""
     _, direction, near = neighbourhoods(row, points, spacing, tree)
     near /= near.sum(axis=1)[:, None]
 
@@ -62,7 +64,7 @@ def _fullest(row, points, spacing, tree, normals):
     axes = np.cross(direction[:, one], direction[:, two])
     sine = np.linalg.norm(axes, axis=2)
     axes = np.concatenate([normals[row, None], axes / np.maximum(sine, _WEDGE)[..., None]], axis=1)
-    inside = np.exp(-0.5 * (axes @ direction.transpose(0, 2, 1) / _INSIDE) ** 2)
+    inside = np.exp(-0.5 * (axes @ direction.transpose(0, 2, 1) / within) ** 2)
     share = np.einsum("rtk,rk->rt", inside, near)
     share[:, 1:][sine < _WEDGE] = 0
 

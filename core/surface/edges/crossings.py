@@ -20,7 +20,7 @@ import numpy as np
 from ...field.grid import CORNERS, Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
-from ...linalg import COMPONENTS, dots, principal_axes
+from ...linalg import COMPONENTS, dots, principal_axes, row_dots
 from ...lookup import least_of_each, numbered
 from ...parallel import even_chunks, in_order
 from ...progress import Progress
@@ -33,6 +33,7 @@ _COVERED = 0.5  # cells, a crossing this close to the surface is on it, a farthe
 _SLACK = 0.1  # cells, by which distances may jump where another sheet becomes the nearest
 _HAIR = np.array([0.02, 0.014, 0.009])  # cells; nodes on the surface, as on grid-aligned walls, all take one side by it
 _LEVEL = 0.99  # cosine between the normal of a sheet and an axis of the grid from which on it is level with it
+_OFF, _AROUND = 0.02, 8  # cells, by which a foot is off the plane of a sample of another sheet; samples asked then
 _TURNED = 8  # steps along edges from odd faces, up to where edges are turned over
 _CHUNK = 1 << 15  # cells
 
@@ -180,9 +181,27 @@ def _off_surface(band, surface, grid):
     """The steps to the nodes, (b,3), from a hair off the surface, so that no node lies on it. Next to sheets level with
     the grid, which whole layers of nodes may lie on, the hair goes across the sheet: the cells along a crease, whose
     normal is of neither wall, see a node on the side that the walls' own cells see it on."""
-    hair, normals = grid.spacing * _HAIR, surface.normals[band.sample]
-    level = (np.abs(normals).max(axis=1) > _LEVEL)[:, None]
-    return band.step + np.where(level, (normals @ hair)[:, None] * normals, hair)
+    hair, normals = grid.spacing * _HAIR, _normals_at_feet(band, surface, grid)
+    return band.step + np.where(_level(normals)[:, None], (normals @ hair)[:, None] * normals, hair)
+
+
+def _normals_at_feet(band, surface, grid):
+    """The normal of the sample next to each node, (b,3), or of another near its foot point where that one is level with
+    the grid and the foot is off its plane, on another sheet."""
+    normals = surface.normals[band.sample]
+    row = np.flatnonzero(_level(normals))
+    foot = grid.positions(band.node[row]) - band.step[row]
+    height = row_dots(foot - surface.points[band.sample[row]], normals[row])
+    row, foot = (each[np.abs(height) > _OFF * grid.spacing] for each in (row, foot))
+    around = surface.tree.query(foot, k=min(_AROUND, surface.tree.n))[1]
+    height = row_dots(foot[:, None] - surface.points[around], surface.normals[around])
+    normals[row] = surface.normals[around[np.arange(len(row)), np.abs(height).argmin(axis=1)]]
+    return normals
+
+
+def _level(normals):
+    """Which sheets with these normals (n,3) are level with the grid, (n,) bool."""
+    return np.abs(normals).max(axis=1) > _LEVEL
 
 
 def _ballots(step, cell):

@@ -79,6 +79,21 @@ def test_a_gap_opens_to_another_sheet_only_when_it_is_level():
         assert (rims.bridged[facing & rims.gap].mean() > 0.5) == joined
 
 
+@pytest.mark.parametrize("lean", [-0.003, 0, 0.003])
+def test_samples_on_a_crease_end_there(lean):
+    """Whichever way their axes lean, neighbours on the other face lie beyond the crease. Taken to lie on this side they
+    left a gap of half a turn."""
+    u, v = np.meshgrid(np.linspace(0, 1, 17), np.linspace(0, 1, 17)[1:])
+    top, wall = (np.stack(axes, axis=-1).reshape(-1, 3) for axes in ((v, u, 0 * u), (0 * u, u, -v)))
+    crease = np.stack([0 * u[0], u[0], 0 * u[0]], axis=1)
+    axes = [[lean, 0, 1]] * len(crease) + [UP] * len(top) + [[1, 0, -lean]] * len(wall)
+    rims, spacing = rims_of(np.concatenate([crease, top, wall]), np.array(axes, float))
+    inner = slice(2, len(crease) - 2)
+    assert not rims.gap[inner].any()
+    assert rims.limit[inner, 0].max() < 0.01 * spacing.min()
+    assert rims.crease[inner, 0, 0].max() < -0.99
+
+
 def test_signs_of_normals_do_not_matter(random):
     points = shapes.hemisphere(500)
     rims, _ = rims_of(points, points)
