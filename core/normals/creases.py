@@ -6,7 +6,9 @@ the plane that most of its neighbours lie in, if any does to within rounding (se
 densest cluster (as tangent planes are taken to the largest cluster of votes by A. Boulch and R. Marlet, Computer
 Graphics Forum 31(5), 2012), provided that the neighbours behind it lie in the plane across it, and that those of the
 sample rise out of its present one. Then facets between the sheets are cut, and the sweeps go on with those that are
-left, and at last samples are taken to planes that they share with neighbours (see :mod:`.shared_planes`).
+left, and at last samples are taken to planes that they share with neighbours (see :mod:`.shared_planes`). Axes further
+off a crease that only lean, as all do where the rows of a lattice lie closer on its other side, are righted by planes
+alone, which must be more exact.
 
 The paper has no such step. Where there is no crease it changes nothing at all.
 """
@@ -53,8 +55,9 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            beside, leaning = agreed_share(here, normals, fixed)[1], (mirrors.confidence(normals) < _UPRIGHT) & ~fixed
-            normals, flat = onto_planes(points, spacing, tree, normals, beside, leaning)
+            leaning = (mirrors.confidence(normals) < _UPRIGHT) & ~fixed
+            suspect = agreed_share(here, normals, fixed)[1]
+            normals, flat = onto_planes(points, spacing, tree, normals, suspect, leaning)
             normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)
             if not (flat | bent).any():
                 break

@@ -35,7 +35,7 @@ _FOLD = 0.87  # largest |n_i . n_j| of neighbours with a fold between them
 _FOLD_REACH = 1.5  # both are this close to the crease, local spacings
 _CHUNK = 1024  # samples
 _PAIRS = 500_000
-_AT = 0.1  # local spacings, samples so close to a crease lie on it, and their axes do not tell on which side
+_AT = 0.1  # local spacings, samples so close to a crease lie on it
 _STRAIGHT_ON = 0.3  # a sheet with samples further than this past a crease ignores it, local spacings
 _OWN = 0.77  # if their |n_i . n_j| is more than this: at 45 degrees those beyond the crease lie flat, too
 
@@ -96,7 +96,8 @@ def _find_rims(part, cloud, bend, bridge):
     own, theirs = normals[part], normals[neighbours]
     step = points[neighbours] - points[part, None]
     flat = one_sheet(step, own[:, None], theirs)
-    same, laid, crease, limit = _laid_flat(step, own, theirs, spacing, cloud.spacing[neighbours], flat)
+    larger = np.maximum(spacing[:, None], cloud.spacing[neighbours])
+    same, laid, crease, limit = _laid_flat(step, own, theirs, spacing, larger, flat)
     place = np.einsum("nki,nai->nka", laid, frames)
     width, middle, bounding = _widest_angles(place, same)
     outward = np.einsum("na,nai->ni", np.stack([np.cos(middle), np.sin(middle)], axis=1), frames)
@@ -154,16 +155,16 @@ def _aligned(normals, other_normals, least):
     return np.abs(row_dots(normals, other_normals)) > least
 
 
-def _laid_flat(step, own, theirs, spacing, there, flat):
+def _laid_flat(step, own, theirs, spacing, larger, flat):
     """Which neighbours are of one sheet, those beyond folds as well, (n,k); steps to them in the sample's tangent plane
-    or, of those that are not beyond a fold, in space, (n,k,3); and the creases, see :func:`_creases`."""
+    or, of those that are not beyond a fold, in space, (n,k,3); and the creases, see :func:`_creases`. `larger` (n,k) is
+    the larger spacing of the two."""
     n = len(step)
     same, laid, crease, limit = flat.copy(), step.copy(), np.zeros((n, 2, 3)), np.full((n, 2), np.inf)
     bent = np.flatnonzero((~flat & ~_aligned(own[:, None], theirs, _FOLD)).any(axis=1))
     if len(bent):
-        step, own, theirs, flat = step[bent], own[bent], theirs[bent], flat[bent]
-        spacing, there = spacing[bent], there[bent]
-        folded, lateral, toward, line = _unfolded(step, own, theirs, np.maximum(spacing[:, None], there), flat)
+        step, own, theirs, spacing, larger, flat = (each[bent] for each in (step, own, theirs, spacing, larger, flat))
+        folded, lateral, toward, line = _unfolded(step, own, theirs, spacing, larger, flat)
         level = flat & _aligned(own[:, None], theirs, _OWN)
         crease[bent], limit[bent] = _creases(step, level, folded, toward, line, spacing)
         laid[bent] = np.where(folded[..., None], lateral, step)
@@ -171,9 +172,9 @@ def _laid_flat(step, own, theirs, spacing, there, flat):
     return same, laid, crease, limit
 
 
-def _unfolded(step, normals, other_normals, spacing, flat):
+def _unfolded(step, normals, other_normals, spacing, larger, flat):
     """Neighbours beyond a fold, laid out in the sample's tangent plane. Of a sample on the crease they lie opposite to
-    its `flat` neighbours, (n,k) bool.
+    its `flat` neighbours, (n,k) bool, and may be as far off as the `larger` spacing of the two, (n,k), allows.
 
     Returns whether each is one (n,k), its unfolded step (n,k,3), the unit tangent towards the crease (n,k,3) and the
     distance to the crease (n,k).
@@ -187,10 +188,11 @@ def _unfolded(step, normals, other_normals, spacing, flat):
     line = row_dots(step, other_normals) / sine
     other_line = np.abs(np.einsum("nki,ni->nk", step, normals)) / sine
     inwards = np.einsum("nki,nk->ni", step, flat)
-    side = np.where(np.abs(line) < _AT * spacing, -np.einsum("nki,ni->nk", across, inwards), line)
+    at = np.abs(line) < _AT * spacing[:, None]
+    side = np.where(at, -np.einsum("nki,ni->nk", across, inwards), line)
     across = across * np.where(side < 0, -1.0, 1.0)[..., None]
     line = np.abs(line)
-    reach = _FOLD_REACH * spacing
+    reach = _FOLD_REACH * np.where(at, larger, spacing[:, None])
     folded &= (line < reach) & (other_line < reach)
     along = np.cross(normals[:, None], across)
     slide = row_dots(step, along)

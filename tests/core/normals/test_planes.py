@@ -41,17 +41,17 @@ def test_lattices_of_boxes_are_closed_in_single_layers_and_signed(cells):
         assert shapes.signed_volume(mesh) == pytest.approx(np.prod(cells), rel=0.02)
 
 
-STRETCHED = [((16, 16, 16), (1, 1, 2), 48), ((16, 16, 16), (1, 1, 2), 128), ((16, 16, 16), (1, 0.5, 0.5), 100)]
-
-
-@pytest.mark.parametrize(("cells", "stretch", "resolution"), [*STRETCHED, ((32, 32, 32), (1, 1, 2), 100)])
+@pytest.mark.parametrize(
+    ("cells", "stretch", "resolution"),
+    [(16, (1, 1, 2), 128), (16, (1, 0.5, 0.5), 100), (16, (1, 0.7, 0.4), 128), (32, (1, 1, 2), 100)],
+)
 def test_stretched_lattices_of_boxes_are_closed(cells, stretch, resolution):
     """Next to their edges axes leaned by a few degrees, the closer rows on the other face having more of a say; sides
     ended short of them, and ends of boxes came off."""
-    points = box_lattice(*cells) * stretch
+    points = box_lattice(cells, cells, cells) * stretch
     before, axes, _, _ = parted(points)
     assert (off_all_faces(before) > 2).mean() > 0.1
-    inside = (points == 0).sum(axis=1) + (points == np.multiply(cells, stretch)).sum(axis=1) < 3
+    inside = (points == 0).sum(axis=1) + (points == np.multiply(cells, stretch)).sum(axis=1) < 3  # no corner
     assert off_all_faces(axes)[inside].max() < 1
     result = reconstruct(points, Settings(resolution=resolution, surface="both"))
     assert (result.sheet.edge_counts()[1] == 2).all()
