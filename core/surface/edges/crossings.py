@@ -22,7 +22,7 @@ from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import COMPONENTS, dots, principal_axes, row_dots
 from ...lookup import least_of_each, numbered
-from ...parallel import even_chunks, in_order
+from ...parallel import even_chunks, in_order, work_through
 from ...progress import Progress
 from .first_steps import first_steps
 from .meeting_edges import meeting_edges
@@ -166,8 +166,8 @@ def _in_whole_cells(band, lowest, edge):
 def _vote(band, corner, surface, grid, progress):
     """Edges of cells with corners (8,c), (e,) ascending, votes that they are crossed, positive if so, (e,), and which
     share of each is likely below the surface, (e,)."""
-    steps = np.ascontiguousarray(_off_surface(band, surface, grid).T)
-    chunks = even_chunks(corner.shape[1], _CHUNK, progress)
+    steps = _off_surface(band, surface, grid, progress.part(0.0, 0.3))
+    chunks = even_chunks(corner.shape[1], _CHUNK, progress.part(0.3, 1.0))
     cast = in_order(lambda part: _ballots(steps.take(corner[:, part], axis=1), grid.spacing), chunks)
     ballots = zip((np.empty((12, 0)),) * 3, *(found for _, found in cast), strict=True)
     edge = (3 * corner[_EDGES[:, 0]] + _EDGE_AXIS[:, None]).reshape(-1)
@@ -177,24 +177,31 @@ def _vote(band, corner, surface, grid, progress):
     return voted, vote[voted], share[voted] / weight[voted]
 
 
-def _off_surface(band, surface, grid):
-    """The steps to the nodes, (b,3), from a hair off the surface, so that no node lies on it. Next to sheets level with
+def _off_surface(band, surface, grid, progress):
+    """The steps to the nodes, (3,b), from a hair off the surface, so that no node lies on it. Next to sheets level with
     the grid, which whole layers of nodes may lie on, the hair goes across the sheet: the cells along a crease, whose
     normal is of neither wall, see a node on the side that the walls' own cells see it on."""
-    hair, normals = grid.spacing * _HAIR, _normals_at_feet(band, surface, grid)
-    return band.step + np.where(_level(normals)[:, None], (normals @ hair)[:, None] * normals, hair)
+    steps, hair = np.empty((3, len(band.node))), grid.spacing * _HAIR
+
+    def move(part):
+        step = band.step[part]
+        foot = grid.positions(band.node[part]) - step
+        normals = _normals_at_feet(foot, band.sample[part], surface, _OFF * grid.spacing)
+        steps[:, part] = (step + np.where(_level(normals)[:, None], (normals @ hair)[:, None] * normals, hair)).T
+
+    work_through(move, even_chunks(len(band.node), _CHUNK, progress))
+    return steps
 
 
-def _normals_at_feet(band, surface, grid):
-    """The normal of the sample next to each node, (b,3), or of another near its foot point where that one is level with
-    the grid and the foot is off its plane, on another sheet."""
-    normals = surface.normals[band.sample]
+def _normals_at_feet(foot, sample, surface, off):
+    """Normals (m,3) of samples (m,), or of others near foot points (m,3) that are farther than `off` from the planes of
+    those, on another sheet; of sheets level with the grid alone."""
+    normals = surface.normals[sample]
     row = np.flatnonzero(_level(normals))
-    foot = grid.positions(band.node[row]) - band.step[row]
-    height = row_dots(foot - surface.points[band.sample[row]], normals[row])
-    row, foot = (each[np.abs(height) > _OFF * grid.spacing] for each in (row, foot))
-    around = surface.tree.query(foot, k=min(_AROUND, surface.tree.n))[1]
-    height = row_dots(foot[:, None] - surface.points[around], surface.normals[around])
+    height = row_dots(foot[row] - surface.points[sample[row]], normals[row])
+    row = row[np.abs(height) > off]
+    around = surface.tree.query(foot[row], k=range(1, 1 + min(_AROUND, surface.tree.n)))[1]
+    height = row_dots(foot[row, None] - surface.points[around], surface.normals[around])
     normals[row] = surface.normals[around[np.arange(len(row)), np.abs(height).argmin(axis=1)]]
     return normals
 
