@@ -8,7 +8,7 @@ Graphics Forum 31(5), 2012), provided that the neighbours behind it lie in the p
 sample rise out of its present one. Then facets between the sheets are cut, and the sweeps go on with those that are
 left, and at last samples are taken to planes that they share with neighbours (see :mod:`.shared_planes`). Axes further
 off a crease that only lean, as all do where the rows of a lattice lie closer on its other side, are righted by planes
-alone, which must be more exact.
+alone, which must be more exact; next to axes that are given they lean as they should.
 
 The paper has no such step. Where there is no crease it changes nothing at all.
 """
@@ -55,7 +55,7 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            leaning = (mirrors.confidence(normals) < _UPRIGHT) & ~fixed
+            leaning = (mirrors.confidence(normals) < _UPRIGHT) & ~mirrors.and_around(fixed)
             suspect = agreed_share(here, normals, fixed)[1]
             normals, flat = onto_planes(points, spacing, tree, normals, suspect, leaning)
             normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)
