@@ -54,8 +54,9 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     agreed, suspect = agreed_share(mirrors, normals, held)
     if suspect.any():
         here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
+        apart = ~mirrors.and_around(fixed)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
-            leaning = (mirrors.confidence(normals) < _UPRIGHT) & ~mirrors.and_around(fixed)
+            leaning = (mirrors.confidence(normals) < _UPRIGHT) & apart
             suspect = agreed_share(here, normals, fixed)[1]
             normals, flat = onto_planes(points, spacing, tree, normals, suspect, leaning)
             normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)

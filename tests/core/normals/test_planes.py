@@ -99,7 +99,7 @@ def test_samples_that_are_not_suspect_and_lines_stay(random):
     points = np.pad(random.uniform(-1, 1, (500, 2)), ((0, 0), (0, 1)))
     tilted = np.tile([0.6, 0.0, 0.8], (500, 1))
     suspect = points[:, 0] > 0
-    axes, moved = onto_planes(points, local_spacing(points), KDTree(points), tilted, suspect, ~suspect & False)
+    axes, moved = onto_planes(points, local_spacing(points), KDTree(points), tilted, suspect, np.zeros_like(suspect))
     np.testing.assert_array_equal(moved, suspect)
     np.testing.assert_array_equal(axes[~suspect], tilted[~suspect])
     np.testing.assert_allclose(np.abs(axes[suspect]), np.tile([0, 0, 1.0], (suspect.sum(), 1)), atol=1e-9)

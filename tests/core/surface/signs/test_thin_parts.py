@@ -143,8 +143,8 @@ def test_a_tail_thinner_than_a_cell_is_kept(surface, band):
 
 @pytest.mark.parametrize(("width", "deep"), [(0.06, 4), (0.07, 5), (0.08, 5)])
 def test_a_slit_narrower_than_a_cell_is_kept(width, deep):
-    """Some that hold few nodes, hardly two of them next to each other, were refused as not closed. The narrowest may
-    end a cell and a quarter above its bottom, in one of five turns."""
+    """Some that hold few nodes, hardly two of them next to each other, were refused as not closed. Points of
+    the narrowest may be up to a cell and a quarter off, in one of five turns."""
     off = []
     for turn in range(5):
         points = slit_block(width) @ shapes.random_rotation(turn).T

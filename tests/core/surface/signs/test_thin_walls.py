@@ -41,7 +41,7 @@ def test_a_plate_of_one_cell_to_two_is_closed(thickness, turn):
 
 @pytest.mark.parametrize(("thickness", "whole"), [(0.03, 7), (0.04, 7), (0.06, 8)])
 def test_a_thin_plate_on_a_thick_block_is_closed(thickness, whole):
-    """Few nodes lie inside of it, so they were taken for specks. Of a third of a cell it may lose a corner, in one of
+    """Few nodes lie inside of it, so they were taken for specks. Of less than half a cell it may be torn, in one of
     eight turns."""
     runs = [signed(shelf(thickness), turn) for turn in range(8)]
     assert all(thickness < 0.8 * run.field.spacing for run in runs)
