@@ -103,9 +103,9 @@ def scattered_tube(n: int, wall: float) -> np.ndarray:
     return _around(out, turn, np.choose(face, [across, across, 0, 1])) @ random_rotation(1).T
 
 
-def scattered_rectangles(corners, n: int) -> np.ndarray:
+def scattered_rectangles(corners, n: int, seed: int = 0) -> np.ndarray:
     """About n random points, even over rectangles parallel to the axes, each given by its `corners` (low, high)."""
-    rng, sides = np.random.default_rng(0), [np.subtract(high, low) for low, high in corners]
+    rng, sides = np.random.default_rng(seed), [np.subtract(high, low) for low, high in corners]
     areas = np.array([side[side > 0].prod() for side in sides])
     count = np.ceil(n * areas / areas.sum()).astype(int)
     return np.concatenate([rng.uniform(*each, (m, 3)) for each, m in zip(corners, count, strict=True)])
