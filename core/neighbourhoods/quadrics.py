@@ -1,4 +1,6 @@
-"""Robust quadrics through the neighbours of samples."""
+"""Robust quadrics through the neighbours of samples.
+
+Offsets are taken in double precision and worked on in radii, in single precision, component by component."""
 
 from dataclasses import dataclass, replace
 
@@ -16,7 +18,7 @@ COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
 _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
-_EXACT = 1e-9  # residuals below this share of the radius are rounding
+_EXACT = np.float32(1e-6)  # residuals below this share of the radius are rounding
 _SINGLY = 200  # neighbours, above which the means of clusters stand for them
 _MEANS = 128  # of them then, at most, where all clusters are full
 _CHUNK, _QUERIED = 60_000, 300_000  # neighbours, fitted and asked for at a time
@@ -108,7 +110,10 @@ def _through(points, places, sizes, way, progress):
         def pieces(k):
             for first in range(0, len(index), step := max(1, _CHUNK // k)):
                 some = slice(first, first + step)
-                yield way([x[some, :k].copy() for x in offset], distance[some, :k].copy())
+                radius = np.maximum(distance[some, k - 1], np.finfo(float).tiny)
+                in_radii = (each[some, :k] / radius[:, None] for each in (*offset, distance))
+                *steps, away = (each.astype(np.float32) for each in in_radii)
+                yield way(steps, away, radius)
 
         return [joined(list(pieces(k))) for k in sizes]
 
@@ -117,50 +122,47 @@ def _through(points, places, sizes, way, progress):
     return [joined(found) for found in zip(*parts, strict=True)]
 
 
-def _quadrics(offset, distance):
-    """Quadrics through neighbours with offsets, three (m,k), from the sample and distances (m,k), ascending."""
-    radius = distance[:, -1:]
+def _quadrics(offset, distance, radius):
+    """Quadrics through neighbours with offsets, three (m,k), from the sample and distances (m,k), in radii (m,)."""
     normal, frame, basis, weight, height = _in_frames(offset, distance)
     residual = _off_fit(basis, weight, height)
-    scale = _CAUCHY * GAUSS * np.median(np.abs(residual), axis=1, keepdims=True)
-    weight = weight / (1.0 + (residual / np.maximum(scale, _EXACT * radius)) ** 2)
+    scale = np.float32(_CAUCHY * GAUSS) * np.median(np.abs(residual), axis=1, keepdims=True)
+    weight = weight / (1 + (residual / np.maximum(scale, _EXACT)) ** 2)
     coefficients, matrix, full = _weighted_fit(basis, weight, height)
 
-    slope = coefficients[:, 1:3] / radius
-    upright = normal - np.einsum("ma,mai->mi", slope, frame)
+    upright = normal - np.einsum("ma,mai->mi", coefficients[:, 1:3], frame)
     squared = row_dots(upright, upright)
-    step = (coefficients[:, 0] / squared)[:, None] * upright
+    step = (radius * coefficients[:, 0] / squared)[:, None] * upright
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
     steep = np.sqrt(squared)
-    height, normal = np.abs(coefficients[:, 0]) / steep, upright / steep[:, None]
-    return Quadrics(step, height, normal, np.minimum(leverage, 0.95), radius[:, 0])
+    height, normal = radius * np.abs(coefficients[:, 0]) / steep, upright / steep[:, None]
+    return Quadrics(step, height, normal, np.minimum(leverage, 0.95), radius)
 
 
-def _residuals(offset, distance):
+def _residuals(offset, distance, radius):
     """Residuals of such neighbours."""
     normal, _, basis, weight, height = _in_frames(offset, distance)
     squared = _off_fit(basis, weight, height) ** 2
     weight /= np.einsum("mk->m", weight)[:, None]
-    second, fourth = row_dots(weight, squared), row_dots(weight * squared, squared)
+    second, fourth = (row_dots(weight, term).astype(float) for term in (squared, squared * squared))
     with np.errstate(invalid="ignore"):
-        return Residuals(fourth / second**2, np.sqrt(second), normal)
+        return Residuals(fourth / second**2, radius * np.sqrt(second), normal)
 
 
 def _in_frames(offset, distance):
     """Of such neighbours: normals (m,3) of the weighted principal planes and frames (m,2,3) in them; the terms x, y,
-    xx, xy, yy, in radii, five (m,k); weights, and heights over the planes, (m,k)."""
-    radius = distance[:, -1:]
-    weight = np.exp(-_DECAY * (distance / radius) ** 2)
+    xx, xy, yy, five (m,k); weights, and heights over the planes, (m,k)."""
+    weight = np.exp(np.float32(-_DECAY) * distance**2)
     normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
     frame = tangent_frames(normal)
-    axes = frame[:, 0] / radius, frame[:, 1] / radius, normal
-    x, y, height = (dots(offset, axis.T[:, :, None]) for axis in axes)
+    axes = (axis.T[:, :, None].astype(np.float32) for axis in (frame[:, 0], frame[:, 1], normal))
+    x, y, height = (dots(offset, axis) for axis in axes)
     return normal, frame, (x, y, x * x, x * y, y * y), weight, height
 
 
 def _off_fit(basis, weight, height):
     """How far heights (m,k) are off the terms 1 and `basis` that fit them best."""
-    coefficients, *_ = _weighted_fit(basis, weight, height)
+    coefficients = _weighted_fit(basis, weight, height)[0].astype(np.float32)
     residual = height - coefficients[:, :1]
     for a, term in enumerate(basis, start=1):
         residual -= coefficients[:, a, None] * term
