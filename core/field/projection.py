@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..linalg import dots, quadratic_form, row_dots
-from ..parallel import even_chunks, in_order
+from ..parallel import even_chunks, work_through
 from ..progress import Progress
 from ..records import picked
 from .diffusion import fused_axes, kernel_weights
@@ -92,9 +92,11 @@ def project(surface, x: np.ndarray, progress: Progress, nearest: int = NEAREST) 
     """
     m = len(x)
     found = Projection(np.empty(m), np.empty((m, 3)), np.empty(m, bool), np.empty(m, np.float32), np.empty(m, np.int32))
-    chunks = even_chunks(m, CHUNK, progress)
-    for part, piece in in_order(lambda part: _project(surface, x[part], nearest), chunks):
-        found[part] = piece
+
+    def place(part):
+        found[part] = _project(surface, x[part], nearest)
+
+    work_through(place, even_chunks(m, CHUNK, progress))
     return found
 
 
