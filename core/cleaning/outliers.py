@@ -24,6 +24,8 @@ _OFF = 2.0  # distance from the neighbours' plane over their spacing
 _ASTRAY, _FEW = 0.01, 5  # share and number of samples off all wires above which they are strays: ends of wires are, too
 _AT_ITS_HEIGHT = 24, 6, 0.15  # samples with itself; so many this close to its height, over their spacing, are a sheet
 _PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
+_BEHIND = 1.1, 0.7  # spacing and distance off the neighbours' plane of samples that may be a sheet behind another's
+_LAYER, _FLAT = 7, 0.1  # so many of these are such a sheet where so thin: of strays at all heights most have above .2
 _MANY_PROUD = 0.00125  # share of such samples above which they are strays: corners have some
 _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
@@ -50,6 +52,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
     A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
+    Nor is one of these, or beside a surface, that is in a sparse sheet behind a dense one.
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
@@ -60,18 +63,19 @@ def find_outliers(points, progress=None) -> np.ndarray:
         kept = np.flatnonzero(~stray)
         around = Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > max(_DIRTY * len(points), _LONE)
-        found = far_parts(around.points) | _beside(around, _STRICT if dirty else 1.0)
+        behind = _behind_others(around)
+        found = far_parts(around.points) | (_beside(around, _STRICT if dirty else 1.0) & ~behind)
         found |= _scattered(around, part.part(0.6, 0.7))
         part(0.7)
         found |= detached_clouds(around, part.part(0.7, 0.8))
         among_wires = off_wires(around, _LONELY)
         if dirty or _many(among_wires, _ASTRAY):
             found |= among_wires
-        proud = _proud(around)
+        proud = _proud(around) & ~behind
         if _many(proud, _MANY_PROUD):
             found |= proud
         if dirty:
-            found |= _hovering(around, part.part(0.8, 1.0))
+            found |= _hovering(around, part.part(0.8, 1.0)) & ~behind
         stray[kept[found]] = True
         if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
             break
@@ -95,6 +99,18 @@ def _many(found, share):
 def _beside(around, share):
     off_plane = (around.lonely > share * _LONELY) & (around.off > share * _OFF)
     return (off_plane | (around.lonely > share * _ALONE)) & ~around.wire
+
+
+def _behind_others(around):
+    """Which samples are in a sheet of their own, so much sparser than one close by that their neighbours are all of
+    that: of those off the plane of their neighbours, they and the nearest lie in one plane, and so do these."""
+    lonely, off = _BEHIND
+    found, points = np.zeros(len(around.points), bool), around.points
+    row = np.flatnonzero((around.lonely > lonely) & (around.off > off) & ~around.wire)
+    if len(row) >= _LAYER:
+        nearest = KDTree(points[row]).query(points[row], k=_LAYER)[1]
+        found[row] = np.median(thickness(points[row[nearest]])[nearest], axis=1) < _FLAT
+    return found
 
 
 def _proud(around):

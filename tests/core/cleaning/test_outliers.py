@@ -67,6 +67,17 @@ def test_sheets_a_spacing_or_two_apart_stay_whole(gap, seed):
     assert find_outliers(np.column_stack([x, np.repeat([0, gap], 5000)])).sum() <= 1
 
 
+@pytest.mark.parametrize("apart", [4, 6, 8])
+@pytest.mark.parametrize("gap", [2, 3, 4])
+def test_a_sparse_sheet_behind_a_dense_one_stays(gap, apart):
+    """Backs of ears and of other thin parts that are modelled in less detail: lonely, and off the front's plane."""
+    rng, spacing = np.random.default_rng(0), 0.03
+    front, back = (rng.uniform(-1, 1, (int(4 / spacing**2 / each**2), 2)) for each in (1, apart))
+    sheets = (front, 0.0), (back, gap * spacing)
+    points = np.vstack([np.column_stack([x, 0.3 * (x**2).sum(axis=1) - below]) for x, below in sheets])
+    assert find_outliers(points)[len(front) :].mean() < 0.15
+
+
 def test_chunks_change_nothing(monkeypatch):
     rng = np.random.default_rng(1)
     clumps = np.repeat(rng.uniform(-2, 2, (30, 3)), 10, axis=0) + rng.normal(size=(300, 3)) * 0.03
