@@ -38,7 +38,7 @@ def deliver(
     warnings = list(outcome.warnings)
     if collection is None and not keep_both:
         collection = results.previous(scene, origin)
-    if collection is not None and any(obj.mode != "OBJECT" for obj in collection.objects):
+    if collection is not None and results.are_edited(collection.objects):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
     roles, known = results.ROLES, results.member(collection, results.FIELD) if collection is not None else None
@@ -136,17 +136,17 @@ def _place(collection, role, data, origin):
     elif role == results.FIELD:
         datablocks.replace_volume(obj.data, data)
     else:
-        before, now = list(obj.get(results.BOX, ())), _box(obj.data)
-        moved_within = before[:1] == now[:1] and before != now  # with fewer points or more, it was edited
+        moved_within = results.moved_within(obj, box(obj.data))
         datablocks.replace_data(obj.data, data)
     if moved_within or tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
         obj[results.ORIGIN] = origin
-        obj.location = origin
+        results.place(obj, origin)
     if role != results.FIELD:
-        obj[results.BOX] = _box(data)
+        obj[results.BOX] = box(data)
 
 
-def _box(data):
+def box(data: bpy.types.Mesh | bpy.types.PointCloud) -> list[float]:
+    """The number of points, and the corners of their box."""
     points = attributes.values(data.attributes["position"])
     ends = (points.min(axis=0), points.max(axis=0)) if len(points) else ()
     return [float(len(points)), *(float(x) for end in ends for x in end)]

@@ -29,16 +29,9 @@ def _adding_problem(context):
         return "There are no results yet: reconstruct first"
     if not results.is_editable(collection):
         return f"{collection.name} is linked from another file: make it local"
-    if not _is_in(collection, context.view_layer.layer_collection):
+    if not results.is_in(collection, context.view_layer):
         return f"{collection.name} is not in this view layer, or excluded from it: include it in the outliner"
     return ""
-
-
-def _is_in(collection, layer):
-    """Whether `collection` is the one of this layer collection or in it, and not excluded."""
-    if layer.collection == collection and not layer.exclude:
-        return True
-    return any(_is_in(collection, child) for child in layer.children)
 
 
 class _OfResult:
@@ -54,6 +47,7 @@ class _OfResult:
 
     def execute(self, context):
         try:
+            results.leave_modes(context)
             obj = self.make(chosen_result(context))
         except VADError as error:
             self.report({"ERROR"}, str(error))

@@ -8,7 +8,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..core.errors import VADError
 from ..core.io.points import read_scan
-from . import attributes, datablocks
+from . import attributes, datablocks, results
 from .outcome import centre
 
 EXTENSIONS = ".xyz", ".pts", ".txt", ".csv"
@@ -38,6 +38,7 @@ class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
         except VADError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        results.leave_modes(context)
         for other in context.selected_objects:
             other.select_set(False)
         for path, (points, carried) in clouds.items():
@@ -55,7 +56,8 @@ class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
         found = attributes.of_file({name: values[kept] for name, values in carried.items()})
         attributes.write(obj.data, {n: values for n, values in found.items() if n not in obj.data.attributes})
         obj.location = origin
-        context.collection.objects.link(obj)
+        home = context.collection if results.is_editable(context.collection) else context.scene.collection
+        home.objects.link(obj)
         obj.select_set(True)
         context.view_layer.objects.active = obj
         self.report({"INFO"}, f"{obj.name}: {len(finite):,} points")

@@ -12,6 +12,7 @@ from . import (
     preferences,
     presets,
     properties,
+    results,
     run,
     stages,
     volume_files,
@@ -36,6 +37,7 @@ CLASSES = (
 _NEW_DATA = bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
 _NEW_SCENES = bpy.app.handlers.load_post, bpy.app.handlers.depsgraph_update_post
 _SAVES = (
+    (bpy.app.handlers.save_pre, results.forget_deleted),
     (bpy.app.handlers.save_pre, volume_files.bring_along),
     (bpy.app.handlers.save_post, volume_files.keep_saved),
     (bpy.app.handlers.save_post_fail, volume_files.put_back),

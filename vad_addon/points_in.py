@@ -148,7 +148,9 @@ def _components(evaluated, geometry, selected_only):
     elif geometry.mesh:
         yield _values(geometry.mesh.vertices, "co", np.float32, 3), attributes.read(geometry.mesh)
     for cloud in filter(_has_points, (geometry.pointcloud, geometry.curves)):
-        flags = _cloud_selection(cloud) if selected_only else None
+        flags = None
+        if selected_only:
+            flags = _spline_selection(evaluated) if evaluated.type == "CURVE" else _cloud_selection(cloud)
         yield _picked(attributes.values(cloud.attributes["position"]), cloud, flags)
     instances = geometry.instances_pointcloud()
     if _has_points(instances):  # their "position" is uninitialised memory in Blender 4.5 and 5.0
@@ -165,11 +167,24 @@ def _picked(points, data, flags):
 
 
 def _cloud_selection(cloud):
-    """(n,) flags of a point cloud or curves; None where the attribute is missing, which means all."""
+    """(n,) flags of a point cloud or curves; None where the attribute is missing, which means all. In Curve select mode
+    curves have one for each curve."""
     selection = cloud.attributes.get(".selection")
-    if selection is None or selection.domain != "POINT":
+    if selection is None:
         return None
-    return _values(selection.data, "value", bool if selection.data_type == "BOOLEAN" else np.float32)
+    flags = _values(selection.data, "value", bool if selection.data_type == "BOOLEAN" else np.float32)
+    if selection.domain == "POINT":
+        return flags
+    return flags.repeat([curve.points_length for curve in cloud.curves])
+
+
+def _spline_selection(obj):
+    """The same of the control points of a curve object of splines, without modifiers that add some."""
+    points = [
+        (spline.bezier_points, "select_control_point") if spline.type == "BEZIER" else (spline.points, "select")
+        for spline in obj.original.data.splines
+    ]
+    return np.concatenate([_values(some, name, bool) for some, name in points])
 
 
 def _has_points(cloud):

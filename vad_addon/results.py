@@ -1,6 +1,8 @@
 """How the results of a run are found again: custom properties on its collection and its objects."""
 
 import bpy
+from bpy.app.handlers import persistent
+from mathutils import Matrix
 
 ROLE, ORIGIN = "vad_role", "vad_origin"  # of an object; the second is the place that its data is relative to
 BOX = "vad_box"  # of an object: number of its points and the corners of their box, as they were made
@@ -8,6 +10,7 @@ SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 MESHES = SURFACE, SHEET
 ESTIMATE = "estimate"  # samples with normals alone, made without a run; its SOURCE is its own property
 SOURCE, REPORT, SUMMARY, WARNINGS = "vad_source", "vad_report", "vad_summary", "vad_warnings"  # of a collection
+_TYPES = {SAMPLES: "POINTCLOUD", SURFACE: "MESH", SHEET: "MESH", FIELD: "VOLUME", ESTIMATE: "POINTCLOUD"}
 FIELD_OF = "vad_field_of"  # of a collection: :func:`stored_field.identity` of what its field was made from
 
 SHOWN = (  # what the sidebar shows and hides: role, name, for people
@@ -20,8 +23,9 @@ SHOWN = (  # what the sidebar shows and hides: role, name, for people
 
 
 def role(obj: bpy.types.Object) -> str | None:
-    """What `obj` is among the results of a run; None where it is none."""
-    return obj.get(ROLE)
+    """What `obj` is among the results of a run; None where it is none, nor any more: converted to another type."""
+    found = obj.get(ROLE)
+    return found if _TYPES.get(found, obj.type) == obj.type else None
 
 
 def member(collection: bpy.types.Collection, wanted: str) -> bpy.types.Object | None:
@@ -48,15 +52,9 @@ def origin(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | 
 
 
 def estimate(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.types.Object | None:
-    """The normals alone that were found of `source`, unless they are being edited."""
-    return next(
-        (
-            obj
-            for obj in scene.objects
-            if role(obj) == ESTIMATE and source is not None and obj.get(SOURCE) == source and obj.mode == "OBJECT"
-        ),
-        None,
-    )
+    """The normals alone that were found of `source`, unless they are being edited or not of this .blend."""
+    found = (obj for obj in scene.objects if source is not None and role(obj) == ESTIMATE and obj.get(SOURCE) == source)
+    return next((obj for obj in found if _is_own(obj) and not are_edited([obj])), None)
 
 
 def previous(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.types.Collection | None:
@@ -64,7 +62,7 @@ def previous(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.typ
     made = [
         collection
         for collection in scene.collection.children_recursive
-        if source is not None and collection.get(SOURCE) == source and is_editable(collection)
+        if source is not None and collection.get(SOURCE) == source and can_be_updated(collection)
     ]
     return scene.vad.result if scene.vad.result in made else (made or [None])[-1]
 
@@ -72,6 +70,33 @@ def previous(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.typ
 def is_editable(block: bpy.types.ID) -> bool:
     """Whether `block` is of this .blend: what is linked, or overridden, takes no other objects and no other data."""
     return block.library is None and block.override_library is None
+
+
+def can_be_updated(collection: bpy.types.Collection) -> bool:
+    """Whether `collection` and all results in it are of this .blend."""
+    return is_editable(collection) and all(_is_own(obj) for obj in collection.objects if role(obj) is not None)
+
+
+def _is_own(obj):
+    return is_editable(obj) and (obj.data is None or is_editable(obj.data))
+
+
+def are_edited(objects: list[bpy.types.Object]) -> bool:
+    """Whether the data of any of these is in another mode than Object Mode, be it by way of another object."""
+    data = {obj.data for obj in objects} - {None}
+    return any(obj.mode != "OBJECT" for obj in bpy.data.objects if obj.data in data)
+
+
+def place(obj: bpy.types.Object, origin) -> None:
+    """Put `obj`, whose data is relative to `origin` in world space, there, whatever parents and transforms it has."""
+    obj.matrix_world = Matrix.Translation(origin)
+
+
+def moved_within(obj: bpy.types.Object, box: list[float]) -> bool:
+    """Whether the points of a result were moved within it since it was made, by Apply Transforms or Set Origin, given
+    their `box` now. With fewer points or more, it was edited."""
+    before = list(obj.get(BOX, ()))
+    return before[:1] == box[:1] and before != box
 
 
 def summary(collection: bpy.types.Collection) -> list[str]:
@@ -84,6 +109,17 @@ def warnings(collection: bpy.types.Collection) -> list[str]:
     return collection.get(WARNINGS, "").splitlines()
 
 
+def is_in(collection: bpy.types.Collection, layer: bpy.types.ViewLayer) -> bool:
+    """Whether `collection` is in a view layer, and not excluded from it."""
+    pending = [layer.layer_collection]
+    while pending:
+        found = pending.pop()
+        if found.collection == collection and not found.exclude:
+            return True
+        pending += found.children
+    return False
+
+
 def show(scene: bpy.types.Scene, obj: bpy.types.Object, shown: bool) -> None:
     """Show `obj` in every view layer of `scene` and in renders, or hide it there."""
     obj.hide_render = not shown
@@ -91,6 +127,22 @@ def show(scene: bpy.types.Scene, obj: bpy.types.Object, shown: bool) -> None:
         layer.update()
         if obj.name in layer.objects:
             obj.hide_set(not shown, view_layer=layer)
+
+
+def leave_modes(context: bpy.types.Context) -> None:
+    """Back to Object Mode: what is edited would stay so, out of reach, when another object becomes the active one."""
+    active = context.view_layer.objects.active
+    if active is not None and active.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@persistent
+def forget_deleted(*_) -> None:
+    """Before a save: what was deleted is not kept, and saved, for the results that were made of it."""
+    for holder in (*bpy.data.collections, *bpy.data.objects):
+        source = holder.get(SOURCE)
+        if source is not None and is_editable(holder) and not source.users_collection:
+            del holder[SOURCE]
 
 
 def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: list[int]) -> None:

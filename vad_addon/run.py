@@ -40,7 +40,8 @@ class Run:
     def execute(self, context):
         try:
             task = self.prepare(context)
-            if self.options.is_repeat and not self.instant(task):
+            repeated = self.options.is_repeat or self.options.is_repeat_last
+            if repeated and not self.instant(task):
                 self.report({"WARNING"}, f"That takes a while: set it in the tab and press {self.bl_label} there")
                 return {"CANCELLED"}  # Blender brings back what was there
             self._compute(context, task)
@@ -52,7 +53,7 @@ class Run:
         try:
             task = self.prepare(context)
             self._live = self.instant(task)
-            if bpy.app.background or self._live:
+            if bpy.app.background or context.window is None or self._live:
                 self._compute(context, task)
                 return {"FINISHED"}
             self._job = job.start(task, Path(bpy.app.tempdir))
@@ -86,8 +87,7 @@ class Run:
 
     def cancel(self, context):
         """Blender ends the operator: the file is closed, another one loads, or the window goes."""
-        if job.running() is self._job:
-            stop()
+        self._end(context)
 
     def draw(self, context):
         """The redo panel, which computes anew at each touch: live where that is quick."""
@@ -101,6 +101,7 @@ class Run:
     def _compute(self, context, task):
         with _exchange_folder() as folder, percentage(context.window_manager) as progress:
             self.deliver(context, context.scene, outcome.compute(task, folder, progress))
+        self._source = None
 
     def _fail(self, error):
         self.report({"ERROR"}, str(error))
@@ -116,6 +117,7 @@ class Run:
             stop()
         context.window_manager.event_timer_remove(self._timer)
         status.clear()
+        self._source = self._job = None  # Blender keeps operators for their redo panels, and all that these hold
 
 
 def stop() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.settings import options
 from . import attributes, datablocks, extras, overlay, points_in, results, run, stored_field, volume_files
 from .attributes import Attribute
-from .delivery import deliver, of_samples, radius
+from .delivery import box, deliver, of_samples, radius
 from .operators import report_run
 from .outcome import CLEANING, NORMALS, Task
 from .points_in import AXIS, Source
@@ -57,7 +57,7 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
             axes[source.constraints[0]] = source.constraints[1]
             carried[AXIS] = Attribute.of(axes[rows])
         cloud = datablocks.pointcloud_data(f"{source.name} cleaned", found.points, found.origin, carried)
-        obj = _placed(scene, source, cloud, found.origin)
+        obj = _placed(context, scene, source, cloud, found.origin)
         results.take_the_stage(context, obj, self._objects)
         dropped = json.loads(found.report)["cleaning"]["outliers"]
         facts = f"{len(rows):,} points, {dropped:,} strays dropped, moved by {moved.mean():.3g} on average"
@@ -91,13 +91,13 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
         origin = points_in.object_of(source)
         obj = results.estimate(scene, origin)
         if obj is None:
-            obj = _placed(scene, source, cloud, found.origin)
+            obj = _placed(context, scene, source, cloud, found.origin)
             obj[results.ROLE] = results.ESTIMATE
             if origin is not None:
                 obj[results.SOURCE] = origin
         else:
             datablocks.replace_data(obj.data, cloud)
-            obj.location = found.origin
+            results.place(obj, found.origin)
         if not bpy.app.background:
             scene.vad.overlay.show = True
         for warning in found.warnings:
@@ -141,10 +141,13 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         near, axes, confidence, _ = overlay.samples_of(samples.data)
         centre = np.array(samples[results.ORIGIN])
         points = near.astype(np.float64) + centre
+        if results.moved_within(samples, box(samples.data)):
+            place = np.array(samples.matrix_world, np.float64)
+            points = near @ place[:3, :3].T + place[:3, 3]
         made_from = collection.get(results.SOURCE)
         name, uid = (made_from.name, made_from.session_uid) if made_from else (samples.name.removesuffix(" samples"), 0)
         self._source = Source(name, uid, points, attributes.read(samples.data), None)
-        self._collection = collection.session_uid if results.is_editable(collection) else None
+        self._collection = collection.session_uid if results.can_be_updated(collection) else None
         field, volume = results.member(collection, results.FIELD), None
         same = collection.get(results.FIELD_OF) == stored_field.identity(near, axes, confidence, asdict(settings))
         if field is not None and same and stored_field.suffices(settings):
@@ -164,12 +167,13 @@ def _selected(context):
     return [obj.session_uid for obj in objects], points_in.gather(objects, context, context.scene.vad.selected_only)
 
 
-def _placed(scene, source, data, origin):
-    """A new object, beside the one that its points come from."""
+def _placed(context, scene, source, data, origin):
+    """A new object, beside the one that its points come from where that is shown."""
     obj = bpy.data.objects.new(data.name, data)
     obj.location = origin
-    beside, of_scene = points_in.object_of(source), {scene.collection, *scene.collection.children_recursive}
-    homes = [home for home in beside.users_collection if home in of_scene] if beside else []
+    beside = points_in.object_of(source)
+    layer = context.view_layer if context.scene == scene else scene.view_layers[0]
+    homes = [home for home in beside.users_collection if results.is_in(home, layer)] if beside else []
     next(filter(results.is_editable, homes), scene.collection).objects.link(obj)
     return obj
 

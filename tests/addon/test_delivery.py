@@ -163,6 +163,55 @@ def test_results_follow_a_source_that_moved(run, scan):
     assert {tuple(np.round(obj.location, 2)) for obj in run().values()} == {(0, 0, 10)}
 
 
+def test_results_follow_a_source_whatever_moves_them_with_it(blender, run, scan):
+    """A rig moves, turns and scales the scan and the results; the data of the next run is in world space."""
+    made = run()
+    rig = blender.data.objects.new("Rig", None)
+    blender.context.scene.collection.objects.link(rig)
+    for obj in (scan, *made.values()):
+        obj.parent = rig
+    made["surface"].delta_location.x = 7
+    rig.location, rig.rotation_euler, rig.scale = (3, 0, 10), (0.5, 0.2, 1), (2, 2, 2)
+    blender.context.view_layer.update()
+    made = run()
+    blender.context.view_layer.update()
+    for role in ("surface", "samples"):
+        place = np.array(made[role].matrix_world)
+        found = positions(made[role].data) @ place[:3, :3].T + place[:3, 3]
+        assert_allclose(np.linalg.norm(found - [3, 0, 10], axis=1), 2, atol=0.1)
+    assert made["surface"].parent == rig
+
+
+@pytest.mark.parametrize("role", ["samples", "surface"])
+def test_a_result_that_was_converted_is_the_users(blender, run, scan, role):
+    converted = run()[role]
+    converted.hide_set(False)
+    for obj in blender.context.selected_objects:
+        obj.select_set(False)
+    converted.select_set(True)
+    blender.context.view_layer.objects.active = converted
+    blender.ops.object.convert(target="MESH" if role == "samples" else "POINTCLOUD")
+    kind, data = converted.type, converted.data
+    blender.context.view_layer.objects.active = scan
+    scan.select_set(True)
+    converted.select_set(False)
+    assert blender.ops.vad.reconstruct(resolution=24) == {"FINISHED"}
+    assert (converted.type, converted.data) == (kind, data)
+    assert len(blender.context.scene.vad.result.objects) == 4
+
+
+def test_what_was_deleted_is_not_saved_for_its_results(blender, folder, run, scan):
+    result = run()["surface"].users_collection[0].name
+    blender.ops.object.select_all(action="DESELECT")
+    scan.hide_set(False)
+    scan.select_set(True)
+    blender.ops.object.delete()
+    blender.ops.wm.save_mainfile()
+    blender.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
+    assert "Scan" not in blender.data.objects
+    assert "vad_source" not in blender.data.collections[result]
+
+
 def test_both_are_kept_where_asked(blender, run, scan):
     first = run()
     second = run(keep_both=True)
@@ -224,6 +273,19 @@ def test_results_being_edited_stay_as_they_are(blender, run, scan, extension):
     assert not set(made.objects) & set(first.values())
     (warning,) = extension("vad_addon.results").warnings(made)
     assert "is being edited" in warning
+
+
+def test_results_edited_by_way_of_a_duplicate_stay_as_they_are(blender, run, scan):
+    first = run()
+    vertices = len(first["surface"].data.vertices)
+    duplicate = blender.data.objects.new("Linked duplicate", first["surface"].data)
+    blender.context.scene.collection.objects.link(duplicate)
+    blender.context.view_layer.objects.active = duplicate
+    blender.ops.object.mode_set(mode="SCULPT")
+    with blender.context.temp_override(active_object=scan, selected_objects=[scan]):
+        made = run(resolution=16)
+    assert len(first["surface"].data.vertices) == vertices
+    assert not set(made.values()) & set(first.values())
 
 
 def blender_temp(bpy):

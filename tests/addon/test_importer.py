@@ -30,6 +30,23 @@ def test_dropped_files_become_an_object_each(blender, tmp_path, sphere):
     assert [obj.name for obj in blender.context.selected_objects] == ["a", "b"]
 
 
+def test_a_linked_collection_and_edit_mode_are_left(blender, tmp_path, sphere, add_mesh):
+    np.savetxt(tmp_path / "a.xyz", sphere)
+    home = blender.data.collections.new("Home")
+    blender.data.libraries.write(str(tmp_path / "home.blend"), {home})
+    blender.data.collections.remove(home)
+    with blender.data.libraries.load(str(tmp_path / "home.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Home"]
+    scene, layer = blender.context.scene, blender.context.view_layer
+    scene.collection.children.link(blender.data.collections["Home"])
+    edited = add_mesh("Edited", sphere)
+    blender.ops.object.mode_set(mode="EDIT")
+    layer.active_layer_collection = layer.layer_collection.children["Home"]
+    assert blender.ops.vad.import_points(filepath=str(tmp_path / "a.xyz")) == {"FINISHED"}
+    assert "a" in scene.collection.objects
+    assert edited.mode == "OBJECT"
+
+
 def test_the_file_handler_names_the_importer_and_its_files(blender):
     handler = blender.types.VAD_FH_points
     assert handler.bl_import_operator == "vad.import_points"

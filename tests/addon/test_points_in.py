@@ -246,6 +246,30 @@ def test_of_two_objects_with_an_edited_mesh_both_are_edited(blender, extension, 
         assert_allclose(axes.read(obj)[1], np.tile([0, 0, 1], (500, 1)), atol=1e-6)
 
 
+def test_of_curves_only_what_is_selected_in_edit_mode(blender, gather, add):
+    hair = blender.data.hair_curves.new("hair")
+    hair.add_curves([3, 2])
+    hair.attributes["position"].data.foreach_set("vector", np.arange(15, dtype=np.float32))
+    hair.attributes.new(".selection", "BOOLEAN", "CURVE").data.foreach_set("value", [False, True])
+    add("Hair", hair)
+    blender.ops.object.mode_set(mode="EDIT")
+    assert gather(selected_only=True).points.tolist() == [[9, 10, 11], [12, 13, 14]]
+    blender.ops.object.mode_set(mode="OBJECT")
+    blender.ops.object.select_all(action="DESELECT")
+
+    curve = blender.data.curves.new("curve", "CURVE")
+    spline = curve.splines.new("POLY")
+    spline.points.add(3)
+    for i, point in enumerate(spline.points):
+        point.co = i, 0, 0, 1
+    add("Curve", curve)
+    blender.ops.object.mode_set(mode="EDIT")
+    for i, point in enumerate(curve.splines[0].points):
+        point.select = i in {1, 2}
+    assert gather(selected_only=True).points.tolist() == [[1, 0, 0], [2, 0, 0]]
+    assert len(gather().points) == 4
+
+
 def test_an_empty_selection_is_refused(blender, gather, add_mesh, sphere, extension):
     add_mesh("Scan", sphere)
     blender.ops.object.mode_set(mode="EDIT")

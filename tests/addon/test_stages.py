@@ -121,6 +121,44 @@ def test_beside_a_scan_in_a_linked_collection_they_go_into_the_scene(blender, ad
     assert {"Scan cleaned", "Scan cleaned normals"} <= set(blender.context.scene.collection.objects.keys())
 
 
+def test_of_the_scans_collections_they_go_into_one_that_is_shown(blender, scan):
+    scene = blender.context.scene
+    for name in ("Hidden", "Shown"):
+        home = blender.data.collections.new(name)
+        scene.collection.children.link(home)
+        home.objects.link(scan)
+    scene.collection.objects.unlink(scan)
+    blender.context.view_layer.layer_collection.children["Hidden"].exclude = True
+    blender.ops.vad.denoise()
+    made = blender.context.view_layer.objects.active
+    assert (made.name, made.users_collection[0].name) == ("Scan cleaned", "Shown")
+
+
+def test_normals_that_were_converted_or_are_linked_stay_as_they_are(blender, scan, folder):
+    blender.ops.vad.normals()
+    alone = blender.data.objects["Scan normals"]
+    alone.select_set(True)
+    blender.context.view_layer.objects.active = alone
+    scan.select_set(False)
+    blender.ops.object.convert(target="MESH")
+    mesh = alone.data
+    blender.context.view_layer.objects.active = scan
+    scan.select_set(True)
+    alone.select_set(False)
+    assert blender.ops.vad.normals() == {"FINISHED"}
+    assert alone.data == mesh
+    blender.ops.wm.save_mainfile()
+    blender.ops.wm.read_homefile(use_empty=True)
+    with blender.data.libraries.load(str(folder / "scene.blend"), link=True) as (there, wanted):
+        wanted.objects = list(there.objects)
+    for obj in blender.data.objects:
+        blender.context.scene.collection.objects.link(obj)
+    before = set(blender.data.objects)
+    blender.context.view_layer.objects.active = blender.data.objects["Scan"]
+    assert blender.ops.vad.normals() == {"FINISHED"}
+    assert before < set(blender.data.objects)
+
+
 def test_a_run_goes_on_from_the_cleaned_points(blender, scan):
     blender.ops.vad.denoise()
     blender.ops.vad.reconstruct(resolution=24, denoise="0")
@@ -273,6 +311,38 @@ def test_extracting_again_keeps_places_materials_and_the_source(blender, scan):
     assert not made["field"].hide_get()
     assert blender.context.scene.vad.result["vad_source"] == scan
     assert json.loads(blender.context.scene.vad.result["vad_report"])["settings"]["offset"] == 2.0
+
+
+def test_extracting_again_after_transforms_were_applied_stays_in_place(blender, scan):
+    blender.ops.vad.reconstruct(resolution=24)
+    made = by_role(blender)
+    blender.ops.object.select_all(action="DESELECT")
+    made["samples"].hide_set(False)
+    for obj in (made["samples"], made["surface"]):
+        obj.select_set(True)
+    blender.context.view_layer.objects.active = made["samples"]
+    blender.ops.object.transform_apply(location=True, rotation=True, scale=True)
+    assert made["samples"].location.x == 0
+    blender.ops.vad.reextract(resolution=32)
+    for role in ("samples", "surface"):
+        assert np.median(radii(by_role(blender)[role])) == pytest.approx(1, abs=0.05)
+
+
+def test_extracting_again_leaves_linked_results_alone(blender, scan, folder):
+    """Making a linked collection local leaves what is in it linked."""
+    blender.ops.vad.reconstruct(resolution=24)
+    blender.ops.wm.save_mainfile()
+    blender.ops.wm.read_homefile(use_empty=True)
+    with blender.data.libraries.load(str(folder / "scene.blend"), link=True) as (_, wanted):
+        wanted.collections = ["Scan VAD"]
+    collection = blender.data.collections["Scan VAD"]
+    blender.context.scene.collection.children.link(collection)
+    local = collection.make_local()
+    before = {obj.name: obj.data for obj in local.objects}
+    blender.context.view_layer.objects.active = local.objects["Scan surface"]
+    assert blender.ops.vad.reextract(resolution=24) == {"FINISHED"}
+    assert {obj.name: obj.data for obj in local.objects} == before
+    assert blender.context.scene.vad.result != local
 
 
 def test_what_is_missing_is_said(blender, scan, add):
