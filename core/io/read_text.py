@@ -1,5 +1,6 @@
 """Points from text: tables of numbers and Wavefront OBJ."""
 
+import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterable, Iterator
@@ -17,6 +18,8 @@ from .not_a_number import spelt_plainly
 _COMMENT = re.compile(r"(?:^|(?<=[\s\d.,;]))(?:#|//)(?![,;\t])")  # not the mark in a name, as in "Point#,X,Y,Z"
 _UNIT = re.compile(r"\([^)]*\)|\[[^]]*\]")  # as in "X (m)"
 _SEPARATOR = re.compile(r"\W?sep=.\W?", re.IGNORECASE)  # a line for spreadsheets
+_CELL = re.compile(r'"[^"]*"|\S+')  # between blanks
+_MARKS = "\t", ";", ",", None  # that part cells; None stands for any run of blanks
 
 
 def read_text(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -36,12 +39,13 @@ def read_obj(path: Path) -> np.ndarray:
     """(n,3) float64 from the v lines of a Wavefront OBJ file."""
     with _open(path) as file:
         lines = _Lines(file)
-        return _table(path, lines, (line[2:] for line in lines if line.startswith(("v ", "v\t"))), None, (0, 1, 2))
+        vertices = (line[2:] for line in map(str.lstrip, lines) if line.startswith(("v ", "v\t")))
+        return _table(path, lines, vertices, None, (0, 1, 2))
 
 
 class _Lines:
-    """The lines that hold more than blanks and comments, stripped of both; remembers the last one handed out, and the
-    last comment on a line of its own."""
+    """The lines that hold more than blanks and comments, without these and what ends them; remembers the last one
+    handed out, and the last comment on a line of its own."""
 
     def __init__(self, file: TextIO):
         self._file = file
@@ -55,8 +59,8 @@ class _Lines:
             text, comment = spelt_plainly(text), []
             if "#" in text or "//" in text:
                 text, *comment = _COMMENT.split(text, maxsplit=1)
-            text = text.strip()
-            if text:
+            text = text.rstrip(" \r\n")
+            if text.strip():
                 yield text
             elif comment:
                 self.comment = comment[0]
@@ -68,21 +72,21 @@ def _read(path, wanted=None):
         lines, claimed, header = _Lines(file), [], None
         rows = iter(lines)
         first = next(rows, "")
-        if _SEPARATOR.fullmatch(first):
+        if _SEPARATOR.fullmatch(first.strip()):
             first = next(rows, "")
         if _is_count(first):
             claimed.append(int(first))
             rows = _rows_of_blocks(rows, claimed)
             first = next(rows, "")
-        elif not any(map(_is_number, _split(first))):
+        elif not any(map(_is_number, _cells(first, _mark_in(first)))):
             header, first = first, next(rows, "")
-        columns, named = _columns(path, header, lines.comment, _split(first))
+        columns, named, mark = _columns(path, header, lines.comment, first)
         further = list(columns)[3:]
         guessed = not named and further == list(COLOURS)
         columns = {name: c for name, c in columns.items() if name in XYZ or wanted is None or name in wanted}
-        if _has_decimal_commas(first):
+        if mark != "," and _has_decimal_commas(first):
             first, rows = _with_points(first), map(_with_points, rows)
-        table = _table(path, lines, chain([first] if first else [], rows), _delimiter(first), tuple(columns.values()))
+        table = _table(path, lines, chain([first] if first else [], rows), mark, tuple(columns.values()))
     if claimed and sum(claimed) != len(table):
         where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
         raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(table)} follow; is it cut off?")
@@ -92,21 +96,35 @@ def _read(path, wanted=None):
     return table[:, :3], attributes, further
 
 
-def _columns(path, header, comment, values):
-    """The columns of numbers, by name: x, y and z, then those with one among the `values` of the first row; and whether
-    the names are the file's. A comment before it that names as many as there are is a header, as other programs write
-    it."""
-    names = _split(_UNIT.sub("", comment if header is None else header))
+def _columns(path, header, comment, first):
+    """The columns of numbers, by name: x, y and z, then those with one in the first row; whether the names are the
+    file's; and what parts its cells. A comment before it that names as many as there are is a header, as other programs
+    write it."""
+    heading = _UNIT.sub("", comment if header is None else header)
+    between_names, mark = (_mark_in(heading), _mark_in(first)) if header is None else _marks_in(heading, first)
+    names, values = _cells(heading, between_names), _cells(first, mark)
     named = header is not None or (len(names) == len(values) and XYZ.keys() <= {name.lower() for name in names})
+    if header is not None:
+        names = _in_place(names, values, header, first)
     columns = named_columns(path, names) if named else unnamed_columns(path, values)
     shifted = len(names) > len(values) > 0 and max(columns[axis] for axis in XYZ) > 2
-    if named and shifted and _delimiter(header or comment) is None:
+    if named and shifted and mark is None:
         raise InputError(
             f"{path} names {len(names)} columns ({' '.join(names[:8])}), but has {len(values)}; give names without "
             "blanks, or part them by commas"
         )
     kept = {name: c for name, c in columns.items() if name in XYZ or (c < len(values) and _is_number(values[c]))}
-    return kept, named
+    return kept, named, mark
+
+
+def _in_place(names, values, header, first):
+    """The names of a header, each over its column: row names have none as R writes them, in quotes, and as pandas does,
+    above a header that blanks put in its place; and what marks it as a comment stands over none."""
+    if len(names) == len(values) + 1 and names[0] in {"#", "//"}:
+        return names[1:]
+    quoted = first.startswith('"') and first.count('"') == 2
+    indented = header.startswith(" ") and not first.startswith(" ")
+    return ["", *names] if len(values) == len(names) + 1 and (quoted or indented) else names
 
 
 def _rows_of_blocks(rows, claimed):
@@ -134,7 +152,8 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
     first = next(rows := iter(rows), None)
     if first is None:
         return np.empty((0, len(columns)))
-    how = dict(delimiter=delimiter, usecols=columns, comments=None, ndmin=2, quotechar='"' if '"' in first else None)
+    quote = '"' if '"' in first or delimiter is not None else None
+    how = dict(delimiter=delimiter, usecols=columns, comments=None, ndmin=2, quotechar=quote)
     try:
         return np.loadtxt(chain([first], rows), **how)
     except ValueError as error:  # loadtxt takes one row at a time: the last one is the culprit
@@ -146,11 +165,27 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
         ) from error
 
 
-def _delimiter(row):
-    """None stands for any run of blanks; tabs part columns that may hold blanks."""
+def _marks_in(header, first):
+    """What parts the cells of a header and of the first row: the same, where that gives as many of each, else whatever
+    seems to part either."""
+    for mark in _MARKS:
+        names, values = _cells(header, mark), _cells(first, mark)
+        if len(names) == len(values) >= 3 or len(_to_last(names)) == len(_to_last(values)) >= 3:
+            return mark, mark
+    return _mark_in(header), _mark_in(first)
+
+
+def _to_last(cells):
+    """Without the empty ones at the end."""
+    return cells[: max((i for i, cell in enumerate(cells, start=1) if cell), default=0)]
+
+
+def _mark_in(row):
+    """What seems to part the cells of a row by itself; tabs part columns that may hold blanks."""
+    row = _with_points(row) if _has_decimal_commas(row) else row
     if mark := next((mark for mark in ";," if mark in row), None):
         return mark
-    cells = row.split("\t")
+    cells = row.strip().split("\t")
     return "\t" if len(cells) >= 3 and all(cell.strip() for cell in cells) else None
 
 
@@ -167,13 +202,21 @@ def _with_points(row):
     return row.replace(",", ".")
 
 
-def _split(row):
-    row = _with_points(row) if _has_decimal_commas(row) else row
-    return [token.strip().strip('"') for token in row.split(_delimiter(row))]
+def _cells(row, mark):
+    """What is in the cells of a row, decimal commas as points."""
+    if mark != "," and _has_decimal_commas(row):
+        row = _with_points(row)
+    if mark is None:
+        return [cell.strip('"') for cell in _CELL.findall(row)]
+    cells = row.split(mark)
+    if '"' in row:
+        with suppress(csv.Error):  # a cell that is endless
+            cells = next(csv.reader([row], delimiter=mark, skipinitialspace=True))
+    return [cell.strip().strip('"') for cell in cells]
 
 
 def _is_count(line):
-    return line.isdecimal() and len(line) < 19
+    return (line := line.strip()).isdecimal() and len(line) < 19
 
 
 def _is_number(token):

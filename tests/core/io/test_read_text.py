@@ -70,6 +70,40 @@ def test_tabs_and_units_do_not_hide_columns(folder, text):
     assert read_points(written(folder, "scan.txt", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\tx\ty\tz\n0\t1\t2\t3\n1\t4\t5\t6\n",
+        " x y z\n0 1 2 3\n1 4 5 6\n",
+        "    x   y   z\n0   1   2   3\n10  4   5   6\n",
+        '"x" "y" "z"\n"1" 1 2 3\n"2" 4 5 6\n',
+        ",x,y,z\n0,1,2,3\n1,4,5,6\n",
+    ],
+    ids=["pandas, tabs", "pandas, blanks", "pandas, printed", "R", "commas"],
+)
+def test_names_of_rows_are_no_coordinates(folder, text):
+    assert read_points(written(folder, "scan.txt", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "label\tx\ty\tz\ti\nwall\t1\t2\t3\t9\n\t4\t5\t6\t9\n",
+        "id\tlabel\tx\ty\tz\ti\n1\t\t1\t2\t3\t9\n2\t\t4\t5\t6\t9\n",
+        "label\tx\ty\tz\ti\nwall\t1\t2\t3\t\nfloor\t4\t5\t6\t9\n",
+        "#\tX\tY\tZ\tIntensity\n1\t2\t3\t128\n4\t5\t6\t128\n",
+        'label,x,y,z\nwall,1,2,3\n"a, b",4,5,6\n',
+        "label\tx\ty\tz\nwall, north\t1\t2\t3\nfloor\t4\t5\t6\n",
+        "x,y,z,note\n1,2,3,a;b\n4,5,6,c\n",
+        '"name, all of it",x,y,z\n7,1,2,3\n8,4,5,6\n',
+        "  x   y   z\n  1   2   3   9\n  4   5   6   9\n",
+        "x y z\n1 2 3 9\n4 5 6 9\n",
+    ],
+)
+def test_header_and_rows_say_together_what_parts_their_cells(folder, text):
+    assert read_points(written(folder, "scan.txt", text)).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
 def test_many_columns_of_other_names_are_refused(folder):
     message = refusal(folder, "scan.csv", "Point,Easting,Northing,Elevation\n1,2,3,4\n")
     assert "4 columns, named Point, Easting, Northing, Elevation; name those of the coordinates x, y and z" in message
