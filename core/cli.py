@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 from tqdm import tqdm
 
 from .budget import SUITED, estimate_cost, suited_resolution
+from .cleaning.clean import clean
 from .cleaning.noise import looks_noisy
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
@@ -248,7 +249,8 @@ def _progress():
         return not pressed
 
     numbers = (signal.SIGINT, signal.SIGTERM) if _in_main_thread() else ()
-    previous = {number: signal.signal(number, interrupt) for number in numbers}
+    heeded = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]  # not in the background
+    previous = {number: signal.signal(number, interrupt) for number in heeded}
     try:
         with tqdm(total=1.0, bar_format=_BAR, miniters=0, disable=None, leave=False) as bar:
             yield report
@@ -301,7 +303,8 @@ def _summary(report):
 def _info(given):
     settings = Settings(resolution=given.resolution, band=given.band, surface=given.surface)
     points = read_points(given.scan)
-    samples = prepare_samples(points)
+    every = prepare_samples(points)
+    samples, dropped = clean(every, Settings(denoise=0.0))
     nearest = KDTree(samples.points).query(samples.points, k=2, workers=-1)[0][:, 1] * samples.scale
     used = points[samples.source_index]
     finite = np.flatnonzero(np.isfinite(points).all(axis=1))
@@ -316,7 +319,8 @@ def _info(given):
         "points": len(points),
         "not_finite": len(points) - len(finite),
         "duplicates": len(finite) - distinct,
-        "near_copies": distinct - len(used),
+        "near_copies": distinct - len(every.points),
+        "outliers": dropped["outliers"],
         "box": {"low": low, "high": high, "size": high - low},
         "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
         "spacing": np.median(spacing),
@@ -337,8 +341,8 @@ def _described(facts):
     cost = facts["estimate"]
     band = "" if facts["band"] is None else f", those within {facts['band']:g} cells of the surface alone"
     return (
-        f"points   {facts['points']}, of which {facts['not_finite']} not finite, {facts['duplicates']} duplicates and "
-        f"{facts['near_copies']} near copies of others\n"
+        f"points   {facts['points']}, of which {facts['not_finite']} not finite, {facts['duplicates']} duplicates, "
+        f"{facts['near_copies']} near copies of others and {facts['outliers']} outliers\n"
         f"box      {low} to {high}, size {size}\n"
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"

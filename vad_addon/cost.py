@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.budget import advised_band, estimate_cost, suited_resolution
+from ..core.cleaning.clean import clean
 from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
@@ -28,10 +29,12 @@ class Points:
     noisy: bool
 
     @classmethod
-    def of(cls, points: np.ndarray, progress=None) -> "Points":
-        """Those of (n,3) points. Raises :class:`InputError` for points that cannot be used."""
+    def of(cls, points: np.ndarray, outliers: bool = True, progress=None) -> "Points":
+        """Those of (n,3) points, where `outliers` without strays. Raises :class:`InputError` for points that cannot be
+        used."""
         progress = Progress.of(progress)
-        samples = prepare_samples(points, progress.part(0.0, 0.5)).in_spatial_order()
+        samples = prepare_samples(points, progress.part(0.0, 0.3)).in_spatial_order()
+        samples, _ = clean(samples, Settings(outliers=outliers, denoise=0.0), progress.part(0.3, 0.5))
         corners = np.stack([samples.points.min(axis=0), samples.points.max(axis=0)])
         spacing = local_spacing(samples.points, progress.part(0.5, 0.9))
         return cls(corners, spacing, samples.scale, looks_noisy(samples.points, spacing))
@@ -81,7 +84,8 @@ def suits() -> int:
 def _selected(context):
     objects = points_in.sources(context)
     names = [(obj.session_uid, obj.mode) for obj in objects]
-    return names, points_in.point_count(objects, context), chosen(context.scene.vad)["selected_only"]
+    stored = context.scene.vad
+    return names, points_in.point_count(objects, context), chosen(stored)["selected_only"], stored.outliers
 
 
 class VAD_OT_estimate(bpy.types.Operator):
@@ -103,7 +107,7 @@ class VAD_OT_estimate(bpy.types.Operator):
             stored = context.scene.vad
             source = points_in.gather(points_in.sources(context), context, stored.selected_only)
             with percentage(context.window_manager) as progress:
-                _asked = _selected(context), Points.of(source.points, progress)
+                _asked = _selected(context), Points.of(source.points, stored.outliers, progress)
             _told.clear()
             settings_from(stored)
         except VADError as error:

@@ -140,7 +140,7 @@ def node_gradient(values: "np.ndarray | Blocks", spacing: float) -> "np.ndarray 
         return np.stack(np.gradient(values, np.float32(spacing)), axis=-1)
     slopes = np.empty((*values.stored.shape, 3), np.float32)
     middle = (slice(None), *(slice(1, -1),) * 3)
-    limit = np.abs(values.outer).max()
+    limit, inside = np.abs(values.outer).max(), values.inside()
     for rows, around in values.padded():
         known = np.ones(around[middle].shape, bool)
         for axis, at_side in zip((1, 2, 3), values.at_sides(rows), strict=True):
@@ -148,7 +148,7 @@ def node_gradient(values: "np.ndarray | Blocks", spacing: float) -> "np.ndarray 
             slopes[rows, ..., axis - 1] = np.where(at_side, 2 * slope, slope)  # half of it is to the same value again
             for shift in (-1, 1):
                 known &= np.abs(np.roll(around, shift, axis=axis)[middle]) < limit
-        slopes[rows][~known] = 0
+        slopes[rows][~(known & inside[rows])] = 0
     return replace(values, stored=slopes, outer=np.zeros(values.slot.shape, np.float32))
 
 

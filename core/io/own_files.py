@@ -1,17 +1,24 @@
 """Which files this program made, as it tells them from a user's own of the same name."""
 
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 from .report import report_of
 
 MADE_BY = "made by VAD (Voronoi-Assisted Diffusion)"
-_STARTS = {".ply": MADE_BY, ".vdb": MADE_BY, ".npz": "values.npy"}  # what is near the start of each
-_START = 1 << 10  # bytes
+_ARRAYS = {"values.npy", "origin.npy", "node.npy", "foot.npy"}  # in each .npz, among others
+_START = 1 << 10  # bytes of a .ply or .vdb, that say it
 
 
 def is_own(path: Path) -> bool:
     """Whether the .ply, .vdb, .npz or .json file `path` was made by this program, by what it holds."""
     if path.suffix == ".json":
         return bool(report_of(path))
+    if path.suffix == ".npz":
+        try:
+            with ZipFile(path) as archive:
+                return set(archive.namelist()) >= _ARRAYS
+        except BadZipFile:
+            return False
     with open(path, "rb") as file:
-        return _STARTS[path.suffix].encode() in file.read(_START)
+        return MADE_BY.encode() in file.read(_START)

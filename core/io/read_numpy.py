@@ -15,7 +15,17 @@ from ..errors import InputError
 MAX_UNPACKED = 2 * 2**30  # bytes of one array in a .npz: 89 million points of float64
 
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-_DAMAGE = (ValueError, EOFError, SyntaxError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
+_PACKED = (zipfile.lzma.LZMAError,) if zipfile.lzma else ()  # not every Python has that module
+_DAMAGE = (
+    *_PACKED,
+    ValueError,
+    EOFError,
+    SyntaxError,
+    RuntimeError,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 def read_npy(path: Path) -> np.ndarray:

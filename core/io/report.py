@@ -21,13 +21,16 @@ def write_report(path: str | os.PathLike, report: dict) -> None:
         temporary.write_text(report_json(report) + "\n", encoding="utf-8")
 
 
+_OF_A_RUN = {"settings", "counts", "seconds"}  # what every report of one holds
+
+
 def report_of(path: str | os.PathLike) -> dict:
     """The report of a scan that was written as the file `path`; empty where there is no such file, or another."""
     try:
         report = json.loads(Path(path).read_text("utf-8"))
     except (OSError, ValueError):
         return {}
-    sound = isinstance(report, dict) and isinstance(report.get("scan"), str)
+    sound = isinstance(report, dict) and report.keys() >= _OF_A_RUN and isinstance(report.get("scan"), str)
     return report if sound and isinstance(report.get("files", []), list) else {}
 
 

@@ -29,15 +29,16 @@ def vertex_attributes(mesh: Mesh, result: Reconstruction, carried: dict | None =
 
 def sample_attributes(result: Reconstruction, carried: dict | None = None) -> dict[str, np.ndarray]:
     """The same for each sample of the result, (n',) or (n',k), but for the distance."""
-    carried, count = carried or {}, result.report["counts"]["input"]
+    count = result.report["counts"]["input"]
+    carried = {name: np.asarray(values) for name, values in (carried or {}).items()}
     for name, values in carried.items():
-        if len(values) != count:
-            raise InputError(f"attribute {name!r} has {len(values)} rows for {count} points; give one row for each")
+        if values.shape[:1] != (count,):
+            raise InputError(f"attribute {name!r} has shape {values.shape}; give one row for each of {count} points")
     kept = {"confidence": result.confidence.astype(np.float32)}
     for name, values in carried.items():
         while name in _OWN or name in kept:
             name = _OTHERS + name
-        kept[name] = np.asarray(values)[result.source_index]
+        kept[name] = values[result.source_index]
     return kept
 
 

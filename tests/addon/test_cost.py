@@ -57,6 +57,17 @@ def test_the_answer_follows_the_settings_and_goes_with_the_points(blender, exten
     assert cost.lines(blender.context) == []
 
 
+def test_strays_count_where_they_stay(blender, extension, add_mesh, sphere):
+    cost, stored = extension("vad_addon.cost"), blender.context.scene.vad
+    add_mesh("Scan", np.vstack([sphere, [[1000, 0, 0]]]))
+    blender.ops.vad.estimate()
+    assert cost.lines(blender.context)[0].startswith("500 points")
+    stored.outliers = False
+    assert cost.lines(blender.context) == []
+    blender.ops.vad.estimate()
+    assert cost.lines(blender.context)[0].startswith("501 points")
+
+
 def test_noisy_points_are_noticed(extension):
     rng = np.random.default_rng(0)
     points = rng.normal(size=(20_000, 3))

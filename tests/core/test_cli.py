@@ -267,6 +267,14 @@ def test_files_that_others_made_stay(capsys, scan, calls, tmp_path, ending):
     assert not calls
 
 
+def test_files_of_others_that_resemble_ours_stay(capsys, scan, calls, tmp_path):
+    (tmp_path / "ball.json").write_text('{"scan": "ball.npy", "scanner": "a", "files": ["ball.vdb"]}')
+    assert "ball.json is there, and was not made" in refused(capsys, "reconstruct", scan, "-o", tmp_path)
+    (tmp_path / "ball.json").unlink()
+    np.savez(tmp_path / "ball.npz", values=np.zeros(3))
+    assert "ball.npz is there, and was not made" in refused(capsys, "reconstruct", scan, "-o", tmp_path, "--arrays")
+
+
 @pytest.mark.parametrize("surface", ["both", "signed"])
 def test_results_of_a_run_that_was_killed_before_its_report_are_replaced(capsys, scan, calls, tmp_path, surface):
     arguments = "reconstruct", scan, "-o", tmp_path / "out", "--arrays", "--surface", surface
@@ -337,6 +345,22 @@ def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkey
     assert signal.getsignal(number) == before
 
 
+def test_signals_that_a_shell_has_ignored_stay_so(capsys, scan, calls, tmp_path, monkeypatch):
+    """Ctrl-C is not for jobs in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        make = cli.reconstruct
+
+        def reconstruct(*arguments, **options):
+            os.kill(os.getpid(), signal.SIGINT)
+            return make(*arguments, **options)
+
+        monkeypatch.setattr(cli, "reconstruct", reconstruct)
+        assert run(capsys, "reconstruct", scan, "-o", tmp_path / "out")[0] == 0
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_the_bar_shows_on_a_terminal_only(capsys, scan, calls, tmp_path, monkeypatch):
     assert run(capsys, "reconstruct", scan, "-o", tmp_path)[2] == ""
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
@@ -381,8 +405,17 @@ def test_info_counts_and_measures(capsys, tmp_path):
     assert facts["grid"]["shape"][0] == 65
     np.testing.assert_allclose(facts["spacing"], 0.5 * (4 + 2 * np.sqrt(2)) / 6)  # four straight, two diagonal
     status, out, _ = run(capsys, "info", tmp_path / "lattice.npy")
-    assert "203, of which 1 not finite, 2 duplicates and 0 near copies of others" in out
+    assert "203, of which 1 not finite, 2 duplicates, 0 near copies of others and 0 outliers" in out
     assert "size 9.5 4.5 0" in out
+
+
+def test_info_is_of_a_run_that_drops_strays(capsys, scan, tmp_path):
+    np.save(tmp_path / "stray.npy", np.vstack([np.load(scan), [[3000.0, 0, 0]]]))
+    clean, stray = (json.loads(run(capsys, "info", path, "--json")[1]) for path in (scan, tmp_path / "stray.npy"))
+    assert (clean["outliers"], stray["outliers"], stray["points"]) == (0, 1, 401)
+    assert {key: stray[key] for key in ("box", "grid", "suited_resolution")} == {
+        key: clean[key] for key in ("box", "grid", "suited_resolution")
+    }
 
 
 def test_info_tells_near_copies_from_duplicates(capsys, tmp_path):

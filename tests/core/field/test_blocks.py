@@ -166,6 +166,8 @@ def test_gradients_are_those_of_the_dense_array_but_at_the_end_of_the_band():
         known = dense < 2.9
         np.testing.assert_allclose(part[known], expected[known][:, axis], atol=1e-5)
         assert not part[(dense >= 4) & inner].any()
+    assert not blocks.inside().all()
+    assert not slopes.stored[~blocks.inside()].any()
 
 
 @pytest.mark.parametrize("shape", [(8, 8, 8), (1, 17, 64)])

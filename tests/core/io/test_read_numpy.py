@@ -123,6 +123,19 @@ def test_damage_anywhere_is_refused_or_harmless(folder):
                 assert read_points(folder / name).shape[1] == 3
 
 
+@pytest.mark.parametrize("way", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_damage_in_other_compressions_is_refused_or_harmless(folder, way):
+    with zipfile.ZipFile(folder / "whole.npz", "w", way) as archive:
+        archive.writestr("points.npy", npy(np.random.default_rng(0).normal(size=(20, 3))))
+    whole = (folder / "whole.npz").read_bytes()
+    for place in range(30, 200):
+        damaged = bytearray(whole)
+        damaged[place] ^= 0xFF
+        (folder / "scan.npz").write_bytes(damaged)
+        with suppress(InputError):
+            assert read_points(folder / "scan.npz").shape == (20, 3)
+
+
 def test_no_rows(folder):
     np.save(folder / "scan.npy", np.zeros((0, 3)))
     assert "holds no points" in refusal(folder / "scan.npy")

@@ -49,8 +49,10 @@ def test_numpy_values_paths_and_infinities(tmp_path):
 def test_the_scan_of_a_report_is_read_back(tmp_path):
     path = tmp_path / "report.json"
     assert report_of(path) == {}
-    write_report(path, {"scan": tmp_path / "b.ply"})
+    run = {"settings": {}, "counts": {}, "seconds": {}}
+    write_report(path, run | {"scan": tmp_path / "b.ply"})
     assert report_of(path)["scan"] == str(tmp_path / "b.ply")
-    for other in ('{"scan": 3}', '{"scan": "b.ply", "files": 3}', "[]", "{", "\udcff"):
+    others = run | {"scan": 3}, run | {"scan": "b.ply", "files": 3}, {"scan": "b.ply", "scanner": "a user's own"}
+    for other in (*map(json.dumps, others), "[]", "{", "\udcff"):
         path.write_bytes(other.encode("utf-8", "surrogateescape"))
         assert report_of(path) == {}

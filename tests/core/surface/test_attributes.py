@@ -43,5 +43,6 @@ def test_what_points_carry_comes_from_the_nearest_sample_by_its_row_in_the_input
 
 
 def test_a_row_for_each_point_of_the_input_is_needed(sphere_run):
-    with pytest.raises(InputError, match="'label' has 1499 rows for 1500 points"):
-        vertex_attributes(sphere_run.surface, sphere_run, {"label": np.zeros(1499)})
+    for label, shape in ((np.zeros(1499), r"\(1499,\)"), (5, r"\(\)")):
+        with pytest.raises(InputError, match=f"'label' has shape {shape}; give one row for each of 1500 points"):
+            vertex_attributes(sphere_run.surface, sphere_run, {"label": label})
