@@ -56,6 +56,12 @@ class Progress:
             self(first / count)
             yield slice(first, min(first + size, count))
 
+    def pieces(self, count: int, size: int) -> Iterator[tuple[slice, "Progress"]]:
+        """Slices of `size` that cover `count` rows in order, and the part of the progress that each takes."""
+        for first in range(0, count, size):
+            last = min(first + size, count)
+            yield slice(first, last), self.part(first / count, last / count)
+
     def each(self, items: Sequence) -> Iterator:
         """The items in order; reports before each."""
         for number, item in enumerate(items):

@@ -9,6 +9,7 @@ needs no linear solve, see :mod:`transport`.
 import numpy as np
 
 from ..progress import Progress
+from ..records import joined
 from ..settings import Settings
 from .feet import no_farther_than_feet, settled_feet
 from .grid import Grid
@@ -20,6 +21,7 @@ from .steps import NearBand
 from .transport import transport
 
 BAND = 2.0  # cells, where the projection distance itself is kept
+_PIECE = 1 << 21  # nodes projected at a time: where few points reach over large parts of the box most are outside
 
 
 def distance_field(
@@ -51,7 +53,9 @@ def near_band(surface: LocalSurface, grid: Grid, progress=None) -> NearBand:
 
 def _projected(surface, grid, progress):
     """Flat indices of the nodes within the band, and where they fall on the surface."""
-    node = near_nodes(surface, grid, BAND, progress.part(0.0, 0.1))
-    near = surface.project(grid.positions(node), progress.part(0.1, 1.0), FROM_NODES)
-    inside = near.distance <= BAND * grid.spacing
-    return node[inside], near[inside]
+    node, found = near_nodes(surface, grid, BAND, progress.part(0.0, 0.1)), []
+    for rows, part in progress.part(0.1, 1.0).pieces(len(node), _PIECE):
+        near = surface.project(grid.positions(node[rows]), part, FROM_NODES)
+        inside = near.distance <= BAND * grid.spacing
+        found.append((node[rows][inside], near[inside]))
+    return np.concatenate([node for node, _ in found]), joined([near for _, near in found])

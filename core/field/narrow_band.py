@@ -53,7 +53,7 @@ def _projected(surface, groups, progress):
     """The nodes within BAND of the surface, ascending, and where they fall on it. Groups whose middle is farther than
     the rest of its nodes could make up for are left out first."""
     grid, reach, found = groups.grid, sample_reach(surface), []
-    for rows, turn in _pieces(progress, len(groups)):
+    for rows, turn in progress.pieces(len(groups), _PIECE):
         part = groups[rows]
         away = np.linalg.norm(part.middles - surface.points[part.sample], axis=1)
         part = part[away <= reach[part.sample] + grid.spacing * (BAND + 2 * HALF)]
@@ -70,14 +70,9 @@ def _projected(surface, groups, progress):
 
 def _feet(surface, grid, node, near, progress):
     found = [
-        settled_feet(surface, grid, node[rows], near[rows], turn)[1] for rows, turn in _pieces(progress, len(node))
+        settled_feet(surface, grid, node[rows], near[rows], turn)[1]
+        for rows, turn in progress.pieces(len(node), _PIECE)
     ]
     return Feet(
         *(np.concatenate([getattr(feet, name) for feet in found], axis=-1) for name in ("centres", "normals", "radius"))
     )
-
-
-def _pieces(progress, count):
-    """Slices that cover `count` rows in order, and the part of the progress that each takes."""
-    for first in range(0, count, _PIECE):
-        yield slice(first, first + _PIECE), progress.part(first / count, min(first + _PIECE, count) / count)
