@@ -152,10 +152,12 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
     first = next(rows := iter(rows), None)
     if first is None:
         return np.empty((0, len(columns)))
-    quote = '"' if '"' in first or delimiter is not None else None
-    how = dict(delimiter=delimiter, usecols=columns, comments=None, ndmin=2, quotechar=quote)
+    rows = chain([first], rows)
+    how = dict(delimiter=delimiter, usecols=columns, comments=None, ndmin=2)
+    if delimiter is not None or '"' in first:
+        how["quotechar"], rows = '"', map(_closed, rows)
     try:
-        return np.loadtxt(chain([first], rows), **how)
+        return np.loadtxt(rows, **how)
     except ValueError as error:  # loadtxt takes one row at a time: the last one is the culprit
         seen = lines.text.strip()
         seen = seen if len(seen) <= 60 else seen[:60] + "..."
@@ -163,6 +165,11 @@ def _table(path, lines: _Lines, rows: Iterable[str], delimiter, columns):
             f"{path}: line {lines.number} is {seen!r}; numbers x y z are expected in "
             f"columns {', '.join(str(column + 1) for column in columns[:3])}"
         ) from error
+
+
+def _closed(row):
+    """A row without its quotes where one is not closed: rows up to the next would be lost in it."""
+    return row if row.count('"') % 2 == 0 else row.replace('"', "")
 
 
 def _marks_in(header, first):

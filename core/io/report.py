@@ -9,6 +9,8 @@ import numpy as np
 
 from .atomic import atomic_path
 
+_OF_A_RUN = {"settings", "counts", "seconds"}  # what every report of one holds
+
 
 def report_json(report: dict) -> str:
     """`report` as strict JSON text: NumPy scalars and arrays become numbers and lists, NaN and infinities null."""
@@ -19,9 +21,6 @@ def write_report(path: str | os.PathLike, report: dict) -> None:
     """Write :func:`report_json` of `report` as the file `path`."""
     with atomic_path(path) as temporary:
         temporary.write_text(report_json(report) + "\n", encoding="utf-8")
-
-
-_OF_A_RUN = {"settings", "counts", "seconds"}  # what every report of one holds
 
 
 def report_of(path: str | os.PathLike) -> dict:

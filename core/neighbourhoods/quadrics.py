@@ -1,6 +1,7 @@
 """Robust quadrics through the neighbours of samples.
 
-Offsets are taken in double precision and worked on in radii, in single precision, component by component."""
+Offsets are taken in double precision and worked on in radii, in single precision, component by component.
+"""
 
 from dataclasses import dataclass, replace
 

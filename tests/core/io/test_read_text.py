@@ -96,6 +96,7 @@ def test_names_of_rows_are_no_coordinates(folder, text):
         "label\tx\ty\tz\nwall, north\t1\t2\t3\nfloor\t4\t5\t6\n",
         "x,y,z,note\n1,2,3,a;b\n4,5,6,c\n",
         '"name, all of it",x,y,z\n7,1,2,3\n8,4,5,6\n',
+        'x,y,z,label\n1,2,3,"6 inch\n4,5,6,"\n',
         "  x   y   z\n  1   2   3   9\n  4   5   6   9\n",
         "x y z\n1 2 3 9\n4 5 6 9\n",
     ],
