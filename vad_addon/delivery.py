@@ -52,8 +52,9 @@ def deliver(
             scene.collection.children.link(collection)
         rollback.pop_all()
     before, mesh = set(collection.objects), results.mesh(collection)
+    turned = results.note_turn(collection, origin)
     for role in roles:
-        _place(collection, role, made.get(role), outcome.origin)
+        _place(collection, role, made.get(role), outcome.origin, turned)
     stays = before if results.mesh(collection) == mesh else set()
     _show_mesh_first(scene, collection, stays)
     _colour(set(collection.objects) - before, source)
@@ -117,7 +118,7 @@ def _data(source, outcome, warnings, rollback):
     return made
 
 
-def _place(collection, role, data, origin):
+def _place(collection, role, data, origin, turned):
     """Give the collection's object of this role new data, make it where it is missing, or remove it for lack of data.
 
     An object that the user moved stays so unless the samples have another centre now, or its points were moved within
@@ -140,7 +141,7 @@ def _place(collection, role, data, origin):
         datablocks.replace_data(obj.data, data)
     if moved_within or tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
         obj[results.ORIGIN] = origin
-        results.place(obj, origin)
+        results.place(obj, origin, turned)
     if role != results.FIELD:
         obj[results.BOX] = box(data)
 

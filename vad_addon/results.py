@@ -10,6 +10,7 @@ SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 MESHES = SURFACE, SHEET
 ESTIMATE = "estimate"  # samples with normals alone, made without a run; its SOURCE is its own property
 SOURCE, REPORT, SUMMARY, WARNINGS = "vad_source", "vad_report", "vad_summary", "vad_warnings"  # of a collection
+TURN = "vad_turn"  # of a collection and of an estimate: rotation and scale of the source, row by row
 _TYPES = {SAMPLES: "POINTCLOUD", SURFACE: "MESH", SHEET: "MESH", FIELD: "VOLUME", ESTIMATE: "POINTCLOUD"}
 FIELD_OF = "vad_field_of"  # of a collection: :func:`stored_field.identity` of what its field was made from
 
@@ -87,9 +88,21 @@ def are_edited(objects: list[bpy.types.Object]) -> bool:
     return any(obj.mode != "OBJECT" for obj in bpy.data.objects if obj.data in data)
 
 
-def place(obj: bpy.types.Object, origin) -> None:
-    """Put `obj`, whose data is relative to `origin` in world space, there, whatever parents and transforms it has."""
-    obj.matrix_world = Matrix.Translation(origin)
+def place(obj: bpy.types.Object, origin, turned: bool) -> None:
+    """Put `obj`, whose data is relative to `origin` in world space, there, whatever parents and deltas it has. How it
+    is turned and scaled stays the user's, unless its source was `turned` or scaled, too: so is its data then."""
+    matrix = Matrix() if turned else obj.matrix_world.copy()
+    matrix.translation = origin
+    obj.matrix_world = matrix
+
+
+def note_turn(holder: bpy.types.ID, source: bpy.types.Object | None) -> bool:
+    """Whether the source of the results that `holder` is, or holds, was turned or scaled since this was called last."""
+    if source is None:
+        return False
+    before, now = list(holder.get(TURN, ())), [x for row in source.matrix_world.to_3x3() for x in row]
+    holder[TURN] = now
+    return before not in ([], now)
 
 
 def moved_within(obj: bpy.types.Object, box: list[float]) -> bool:

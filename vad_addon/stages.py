@@ -95,9 +95,10 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
             obj[results.ROLE] = results.ESTIMATE
             if origin is not None:
                 obj[results.SOURCE] = origin
+                results.note_turn(obj, origin)
         else:
             datablocks.replace_data(obj.data, cloud)
-            results.place(obj, found.origin)
+            results.place(obj, found.origin, results.note_turn(obj, origin))
         if not bpy.app.background:
             scene.vad.overlay.show = True
         for warning in found.warnings:

@@ -182,6 +182,14 @@ def test_results_follow_a_source_whatever_moves_them_with_it(blender, run, scan)
     assert made["surface"].parent == rig
 
 
+def test_how_the_user_turned_and_scaled_a_result_stays_so(run, scan):
+    run()["surface"].scale = 10, 10, 10
+    scan.location = 0, 0, 10
+    surface = run()["surface"]
+    assert tuple(np.round(surface.location, 2)) == (0, 0, 10)
+    assert tuple(surface.scale) == pytest.approx((10, 10, 10))
+
+
 @pytest.mark.parametrize("role", ["samples", "surface"])
 def test_a_result_that_was_converted_is_the_users(blender, run, scan, role):
     converted = run()[role]
