@@ -119,12 +119,14 @@ def _columns(path, header, comment, first):
 
 def _in_place(names, values, header, first):
     """The names of a header, each over its column: row names have none as R writes them, in quotes, and as pandas does,
-    above a header that blanks put in its place; and what marks it as a comment stands over none."""
+    whole numbers beside a header that starts with blanks; and what marks it as a comment stands over none."""
     if len(names) == len(values) + 1 and names[0] in {"#", "//"}:
         return names[1:]
+    if len(values) != len(names) + 1:
+        return names
     quoted = first.startswith('"') and first.count('"') == 2
-    indented = header.startswith(" ") and not first.startswith(" ")
-    return ["", *names] if len(values) == len(names) + 1 and (quoted or indented) else names
+    numbered = header.startswith(" ") and not first.startswith(" ") and values[0].isdecimal()
+    return ["", *names] if quoted or numbered else names
 
 
 def _rows_of_blocks(rows, claimed):

@@ -99,6 +99,7 @@ def test_names_of_rows_are_no_coordinates(folder, text):
         'x,y,z,label\n1,2,3,"6 inch\n4,5,6,"\n',
         "  x   y   z\n  1   2   3   9\n  4   5   6   9\n",
         "x y z\n1 2 3 9\n4 5 6 9\n",
+        " x y z\n1.0 2.0 3.0 9\n4.0 5.0 6.0 9\n",
     ],
 )
 def test_header_and_rows_say_together_what_parts_their_cells(folder, text):
