@@ -61,7 +61,8 @@ files in the folder OUT, named after the scan, each written whole or not at all:
   SCAN_signed.ply  mesh: the boundary of a closed shape's inside (with --surface signed)
   SCAN_points.ply  the samples used, with normals (unit axes, the sign is arbitrary) and confidence
   SCAN.npz         NumPy arrays for other programs, with --arrays (numpy.load): values, origin, spacing, signed (the
-                   field), gradient (at every node); for the nodes near the surface node (i,j,k), direction (unit, away
+                   field), gradient (at every node); with a band those of blocks of 8^3 nodes, with block (the lowest
+                   node of each), shape and band; for the nodes near the surface node (i,j,k), direction (unit, away
                    from the surface) and foot (the nearest point of the surface)
   SCAN.json        settings, counts, seconds, warnings; written last
 All are in the scan's own units and place. Vertices of meshes have the properties distance (how far off the surface)

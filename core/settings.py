@@ -57,7 +57,8 @@ class Settings:
         1.0,
         "Distance at which the two layers of the double cover are first extracted, before they are pulled onto the "
         "surface, where they are not the two sides of a single layer: where points do not show where sheets "
-        "cross, or sheets run side by side, or points are over five cells apart; at more where they are over three. "
+        "cross, or sheets run side by side, or points are over five cells apart, or less than two thirds of one; at "
+        "more where they are over three. "
         "Larger tolerates rougher fields, smaller separates closer sheets",
         limits=(0.5, 4.0),
         unit="cells",
@@ -95,7 +96,7 @@ class Settings:
     )
     diffusion: str = _option(
         "kernel",
-        "Where that equation takes its directions from: the diffusion's closed-form kernels, or the published "
+        "Where the Poisson equation takes its directions from: the diffusion's closed-form kernels, or the published "
         "diffusion on the grid (the reference; without rims, and refused where points are many, mostly above 2,000)",
         choices=("kernel", "grid"),
     )
@@ -107,8 +108,8 @@ class Settings:
     )
     device: str = _option(
         "auto",
-        "Where torch does that: on the processor, on an Nvidia GPU (cuda), or on the GPU where torch sees one. Nothing "
-        "else in a run uses a GPU",
+        "Where torch differentiates the energy: on the processor, on an Nvidia GPU (cuda), or on the GPU where torch "
+        "sees one. Nothing else in a run uses a GPU",
         choices=("cpu", "cuda", "auto"),
     )
     outliers: bool = _option(

@@ -34,7 +34,8 @@ def main() -> int:
     print(f"\nOpen next, in {OUTPUT}:")
     for ending, hint in GUIDE.items():
         print(f"  {SCAN.stem + ending:<18}{hint}")
-    print("The same from Blender's sidebar: `make zip`, then drop the zip in dist/ onto Blender's window.")
+    print("The same from Blender's sidebar: `.venv/bin/python scripts/build_extension.py --wheels`, then drop the zip")
+    print("for your platform from dist/ onto Blender's window.")
     return 0
 
 

@@ -53,10 +53,12 @@ def deliver(
         rollback.pop_all()
     before, mesh = set(collection.objects), results.mesh(collection)
     turned = results.note_turn(collection, origin)
+    looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
     for role in roles:
         _place(collection, role, made.get(role), outcome.origin, turned)
     stays = before if results.mesh(collection) == mesh else set()
     _show_mesh_first(scene, collection, stays)
+    _stay_active(looked_at, results.mesh(collection))
     _colour(set(collection.objects) - before, source)
     if results.FIELD in made:
         shapes.follow(collection)
@@ -161,6 +163,14 @@ def _show_mesh_first(scene, collection, stays):
         obj = results.member(collection, role)
         if obj is not None and obj not in stays:
             results.show(scene, obj, mesh is None or obj == mesh)
+
+
+def _stay_active(layers, mesh):
+    """Where a result that went was the active object, the mesh is it now."""
+    for layer in layers:
+        if layer.objects.active is None and mesh is not None and mesh.name in layer.objects:
+            layer.objects.active = mesh
+            mesh.select_set(True, view_layer=layer)
 
 
 def _colour(objects, source):

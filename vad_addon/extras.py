@@ -60,8 +60,8 @@ class _OfResult:
 
 
 class VAD_OT_shell(_OfResult, bpy.types.Operator):
-    """Add a closed mesh at some distance from the surface, on both sides of it. It follows the volume; its modifier's
-    threshold changes the distance at once"""
+    """Add a closed mesh at some distance from the surface, on both sides of it, of a signed field outside alone; in a
+    band, less than its width away. It follows the volume; its modifier's threshold changes the distance at once"""
 
     bl_idname = "vad.shell"
     bl_label = "Offset Surface"
@@ -188,7 +188,11 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
         description="Where the axis comes from",
         items=[
             ("VIEW", "View", "The direction you look in"),
-            ("ACTIVE", "Active Element", "Normal of the active face, direction of the active edge, axis of the vertex"),
+            (
+                "ACTIVE",
+                "Active Element",
+                "Normal of the active face, direction of the active edge, axis fixed at the vertex",
+            ),
             ("CURSOR", "3D Cursor", "From each point towards the 3D cursor"),
             ("TYPED", "Typed Values", "The axis typed below"),
         ],

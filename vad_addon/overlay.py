@@ -26,7 +26,8 @@ class VAD_PG_overlay(bpy.types.PropertyGroup):
     )
     length: bpy.props.FloatProperty(
         name="Length",
-        description="Length of a line, in units of a sample's size (a quarter of a grid cell)",
+        description="Length of a line, in units of a sample's size (a quarter of a grid cell; of normals found alone, "
+        "of the points' spacing)",
         default=6.0,
         min=0.1,
         max=1000.0,

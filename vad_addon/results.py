@@ -167,7 +167,9 @@ def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: list
     layer = context.view_layer
     layer.update()
     sources = [source for source in layer.objects if source.session_uid in uids]
-    if obj.name not in layer.objects or context.mode != "OBJECT" or origin_of_active(layer) not in sources:
+    active = layer.objects.active
+    made_from = active and (origin(active, context.scene) or active)
+    if obj.name not in layer.objects or context.mode != "OBJECT" or made_from not in sources:
         return
     for other in layer.objects:
         other.select_set(False)
@@ -175,9 +177,3 @@ def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: list
             show(context.scene, other, False)
     layer.objects.active = obj
     obj.select_set(True)
-
-
-def origin_of_active(layer: bpy.types.ViewLayer) -> bpy.types.Object | None:
-    """The active object, or what that was made from."""
-    active = layer.objects.active
-    return active and (active.get(SOURCE) or active)

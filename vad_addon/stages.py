@@ -17,8 +17,8 @@ from .properties import setting_property, settings_from, taken_over
 
 
 class VAD_OT_denoise(run.Run, bpy.types.Operator):
-    """Make a copy of the points without strays, moved onto the smooth surface that neighbours share. The selected
-    objects are hidden and stay as they are"""
+    """Make a copy of the points without strays, moved onto the smooth surface that neighbours share. What they come
+    from is hidden and stays as it is"""
 
     bl_idname = "vad.denoise"
     bl_label = "Clean Points"
@@ -109,7 +109,7 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
 
 class VAD_OT_reextract(run.Run, bpy.types.Operator):
     """Make field and meshes of the last run anew with other settings, from the normals it found. The closed mesh alone
-    is made from the field as it is, in less time, as long as resolution, band and bridge stay"""
+    is made from the field as it is, in less time, where that fills the whole box and resolution and bridge stay"""
 
     bl_idname = "vad.reextract"
     bl_label = "Extract Again"

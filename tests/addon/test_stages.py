@@ -134,6 +134,20 @@ def test_of_the_scans_collections_they_go_into_one_that_is_shown(blender, scan):
     assert (made.name, made.users_collection[0].name) == ("Scan cleaned", "Shown")
 
 
+def test_the_script_of_the_readme_goes_on_where_the_mesh_is_active(blender, scan):
+    """As after a run with a window: the copy is made of the scan, and becomes the active object."""
+    layer = blender.context.view_layer
+    blender.ops.vad.reconstruct(resolution=24, surface="both")
+    scan.select_set(False)
+    layer.objects.active = by_role(blender)["surface"]
+    layer.objects.active.select_set(True)
+    blender.ops.vad.reextract(resolution=24, surface="single")
+    assert layer.objects.active == by_role(blender)["sheet"]
+    blender.ops.vad.denoise()
+    assert layer.objects.active.name == "Scan cleaned"
+    assert scan.hide_get()
+
+
 def test_normals_that_were_converted_or_are_linked_stay_as_they_are(blender, scan, folder):
     blender.ops.vad.normals()
     alone = blender.data.objects["Scan normals"]
