@@ -63,17 +63,17 @@ def find_outliers(points, progress=None) -> np.ndarray:
         kept = np.flatnonzero(~stray)
         around = Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > max(_DIRTY * len(points), _LONE)
-        behind = _behind_others(around)
-        found = far_parts(around.points) | (_beside(around, _STRICT if dirty else 1.0) & ~behind)
+        beside, proud = _beside(around, _STRICT if dirty else 1.0), _proud(around)
+        behind = _behind_others(around, beside | proud)
+        found = far_parts(around.points) | (beside & ~behind)
         found |= _scattered(around, part.part(0.6, 0.7))
         part(0.7)
         found |= detached_clouds(around, part.part(0.7, 0.8))
         among_wires = off_wires(around, _LONELY)
         if dirty or _many(among_wires, _ASTRAY):
             found |= among_wires
-        proud = _proud(around) & ~behind
-        if _many(proud, _MANY_PROUD):
-            found |= proud
+        if _many(proud & ~behind, _MANY_PROUD):
+            found |= proud & ~behind
         if dirty:
             found |= _hovering(around, part.part(0.8, 1.0)) & ~behind
         stray[kept[found]] = True
@@ -101,16 +101,17 @@ def _beside(around, share):
     return (off_plane | (around.lonely > share * _ALONE)) & ~around.wire
 
 
-def _behind_others(around):
+def _behind_others(around, suspect):
     """Which samples are in a sheet of their own, so much sparser than one close by that their neighbours are all of
-    that: of those off the plane of their neighbours, they and the nearest lie in one plane, and so do these."""
+    that: of those off the plane of their neighbours, they and the nearest lie in one plane, and so do these. None where
+    most of those `suspect` are in no such sheet: a few strays among many lie like that by chance."""
     lonely, off = _BEHIND
     found, points = np.zeros(len(around.points), bool), around.points
     row = np.flatnonzero((around.lonely > lonely) & (around.off > off) & ~around.wire)
     if len(row) >= _LAYER:
         nearest = KDTree(points[row]).query(points[row], k=_LAYER)[1]
         found[row] = np.median(thickness(points[row[nearest]])[nearest], axis=1) < _FLAT
-    return found
+    return found & (found[suspect].sum() > _MAJORITY * suspect.sum())
 
 
 def _proud(around):
