@@ -52,7 +52,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
     A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
-    Nor is one of these, or beside a surface, that is in a sparse sheet behind a dense one.
+    Nor is one of these, or beside a surface, that is in a sparse sheet behind a dense one, where most that seem so are.
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
@@ -64,7 +64,10 @@ def find_outliers(points, progress=None) -> np.ndarray:
         around = Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > max(_DIRTY * len(points), _LONE)
         beside, proud = _beside(around, _STRICT if dirty else 1.0), _proud(around)
-        behind = _behind_others(around, beside | proud)
+        behind, suspect = _behind_others(around), beside | proud
+        if turn == 0:  # a few strays among many lie in a plane by chance
+            are_behind = behind[suspect].sum() > _MAJORITY * suspect.sum()
+        behind &= are_behind
         found = far_parts(around.points) | (beside & ~behind)
         found |= _scattered(around, part.part(0.6, 0.7))
         part(0.7)
@@ -101,17 +104,16 @@ def _beside(around, share):
     return (off_plane | (around.lonely > share * _ALONE)) & ~around.wire
 
 
-def _behind_others(around, suspect):
+def _behind_others(around):
     """Which samples are in a sheet of their own, so much sparser than one close by that their neighbours are all of
-    that: of those off the plane of their neighbours, they and the nearest lie in one plane, and so do these. None where
-    most of those `suspect` are in no such sheet: a few strays among many lie like that by chance."""
+    that: of those off the plane of their neighbours, they and the nearest lie in one plane, and so do these."""
     lonely, off = _BEHIND
     found, points = np.zeros(len(around.points), bool), around.points
     row = np.flatnonzero((around.lonely > lonely) & (around.off > off) & ~around.wire)
     if len(row) >= _LAYER:
         nearest = KDTree(points[row]).query(points[row], k=_LAYER)[1]
         found[row] = np.median(thickness(points[row[nearest]])[nearest], axis=1) < _FLAT
-    return found & (found[suspect].sum() > _MAJORITY * suspect.sum())
+    return found
 
 
 def _proud(around):
