@@ -131,7 +131,7 @@ def _place(collection, role, data, origin, turned):
         if obj is not None:
             bpy.data.batch_remove([obj])
         return
-    moved_within = False
+    was_moved = False
     if obj is None:
         obj = bpy.data.objects.new(data.name, data)
         obj[results.ROLE] = role
@@ -139,17 +139,23 @@ def _place(collection, role, data, origin, turned):
     elif role == results.FIELD:
         datablocks.replace_volume(obj.data, data)
     else:
-        moved_within = results.moved_within(obj, box(obj.data))
+        was_moved = moved_within(obj)
         datablocks.replace_data(obj.data, data)
-    if moved_within or tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
+    if was_moved or tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
         obj[results.ORIGIN] = origin
         results.place(obj, origin, turned)
     if role != results.FIELD:
-        obj[results.BOX] = box(data)
+        obj[results.BOX] = _box(data)
 
 
-def box(data: bpy.types.Mesh | bpy.types.PointCloud) -> list[float]:
-    """The number of points, and the corners of their box."""
+def moved_within(obj: bpy.types.Object) -> bool:
+    """Whether the points of a mesh or of samples among the results were moved within it since it was made, by Apply
+    Transforms or Set Origin. With fewer points or more, it was edited."""
+    before, now = list(obj.get(results.BOX, ())), _box(obj.data)
+    return before[:1] == now[:1] and before != now
+
+
+def _box(data):
     points = attributes.values(data.attributes["position"])
     ends = (points.min(axis=0), points.max(axis=0)) if len(points) else ()
     return [float(len(points)), *(float(x) for end in ends for x in end)]

@@ -213,11 +213,10 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
             self.layout.prop(self, "axis")
 
     def axes(self, context, obj, points):
-        matrix = np.array(obj.matrix_world, np.float64)
         if self.origin == "ACTIVE":
             world = axes.of_active(context.active_object)
         elif self.origin == "CURSOR":
-            world = np.array(context.scene.cursor.location) - (points @ matrix[:3, :3].T + matrix[:3, 3])
+            world = np.array(context.scene.cursor.location) - points_in.in_world(points, obj)
         elif self.origin == "VIEW":
             if context.region_data is None:
                 raise InputError("No view to take the axis from: run this in a 3D viewport, or type the axis")
@@ -226,6 +225,7 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
             world = np.array(self.axis)
         if not np.linalg.norm(world, axis=-1).all():
             raise InputError("An axis of length 0 has no direction: give another one")
+        matrix = np.array(obj.matrix_world, np.float64)
         return world @ matrix[:3, :3]  # normals go from world to object space by the transposed matrix
 
 

@@ -56,8 +56,7 @@ class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
         found = attributes.of_file({name: values[kept] for name, values in carried.items()})
         attributes.write(obj.data, {n: values for n, values in found.items() if n not in obj.data.attributes})
         obj.location = origin
-        home = context.collection if results.is_editable(context.collection) else context.scene.collection
-        home.objects.link(obj)
+        results.home([context.collection], context.scene).objects.link(obj)
         obj.select_set(True)
         context.view_layer.objects.active = obj
         self.report({"INFO"}, f"{obj.name}: {len(finite):,} points")

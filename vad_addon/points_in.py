@@ -132,10 +132,16 @@ def _world_cloud(obj, context, selected_only):
     parts = list(_components(evaluated, geometry, selected_only and in_edit_mode(obj)))
     local = np.concatenate([np.empty((0, 3)), *(points for points, _ in parts)])
     carried = attributes.join([(len(points), found) for points, found in parts])
-    matrix = np.array(evaluated.matrix_world, np.float64)
     if AXIS in carried:
-        carried[AXIS] = Attribute("FLOAT_VECTOR", carried[AXIS].values @ np.linalg.pinv(matrix[:3, :3]))
-    return local @ matrix[:3, :3].T + matrix[:3, 3], carried
+        turn = np.array(evaluated.matrix_world, np.float64)[:3, :3]
+        carried[AXIS] = Attribute("FLOAT_VECTOR", carried[AXIS].values @ np.linalg.pinv(turn))
+    return in_world(local, evaluated), carried
+
+
+def in_world(points: np.ndarray, obj: bpy.types.Object) -> np.ndarray:
+    """Points (n,3) in the space of an object, in world space, (n,3) float64."""
+    matrix = np.array(obj.matrix_world, np.float64)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _components(evaluated, geometry, selected_only):

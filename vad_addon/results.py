@@ -73,6 +73,11 @@ def is_editable(block: bpy.types.ID) -> bool:
     return block.library is None and block.override_library is None
 
 
+def home(collections, scene: bpy.types.Scene) -> bpy.types.Collection:
+    """The first of some collections that takes new objects, else the scene's own."""
+    return next(filter(is_editable, collections), scene.collection)
+
+
 def can_be_updated(collection: bpy.types.Collection) -> bool:
     """Whether `collection` and all results in it are of this .blend."""
     return is_editable(collection) and all(_is_own(obj) for obj in collection.objects if role(obj) is not None)
@@ -103,13 +108,6 @@ def note_turn(holder: bpy.types.ID, source: bpy.types.Object | None) -> bool:
     before, now = list(holder.get(TURN, ())), [x for row in source.matrix_world.to_3x3() for x in row]
     holder[TURN] = now
     return before not in ([], now)
-
-
-def moved_within(obj: bpy.types.Object, box: list[float]) -> bool:
-    """Whether the points of a result were moved within it since it was made, by Apply Transforms or Set Origin, given
-    their `box` now. With fewer points or more, it was edited."""
-    before = list(obj.get(BOX, ()))
-    return before[:1] == box[:1] and before != box
 
 
 def summary(collection: bpy.types.Collection) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from ..core.settings import options
 from . import attributes, datablocks, extras, overlay, points_in, results, run, stored_field, volume_files
 from .attributes import Attribute
-from .delivery import box, deliver, of_samples, radius
+from .delivery import deliver, moved_within, of_samples, radius
 from .operators import report_run
 from .outcome import CLEANING, NORMALS, Task
 from .points_in import AXIS, Source
@@ -141,10 +141,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         samples = results.member(collection, results.SAMPLES)
         near, axes, confidence, _ = overlay.samples_of(samples.data)
         centre = np.array(samples[results.ORIGIN])
-        points = near.astype(np.float64) + centre
-        if results.moved_within(samples, box(samples.data)):
-            place = np.array(samples.matrix_world, np.float64)
-            points = near @ place[:3, :3].T + place[:3, 3]
+        points = points_in.in_world(near, samples) if moved_within(samples) else near.astype(np.float64) + centre
         made_from = collection.get(results.SOURCE)
         name, uid = (made_from.name, made_from.session_uid) if made_from else (samples.name.removesuffix(" samples"), 0)
         self._source = Source(name, uid, points, attributes.read(samples.data), None)
@@ -175,7 +172,7 @@ def _placed(context, scene, source, data, origin):
     beside = points_in.object_of(source)
     layer = context.view_layer if context.scene == scene else scene.view_layers[0]
     homes = [home for home in beside.users_collection if results.is_in(home, layer)] if beside else []
-    next(filter(results.is_editable, homes), scene.collection).objects.link(obj)
+    results.home(homes, scene).objects.link(obj)
     return obj
 
 

@@ -67,18 +67,19 @@ def find_outliers(points, progress=None) -> np.ndarray:
         behind, suspect = _behind_others(around), beside | proud
         if turn == 0:  # a few strays among many lie in a plane by chance
             are_behind = behind[suspect].sum() > _MAJORITY * suspect.sum()
-        behind &= are_behind
-        found = far_parts(around.points) | (beside & ~behind)
+        others = ~(behind & are_behind)
+        found = far_parts(around.points) | (beside & others)
         found |= _scattered(around, part.part(0.6, 0.7))
         part(0.7)
         found |= detached_clouds(around, part.part(0.7, 0.8))
         among_wires = off_wires(around, _LONELY)
         if dirty or _many(among_wires, _ASTRAY):
             found |= among_wires
-        if _many(proud & ~behind, _MANY_PROUD):
-            found |= proud & ~behind
+        proud &= others
+        if _many(proud, _MANY_PROUD):
+            found |= proud
         if dirty:
-            found |= _hovering(around, part.part(0.8, 1.0)) & ~behind
+            found |= _hovering(around, part.part(0.8, 1.0)) & others
         stray[kept[found]] = True
         if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
             break

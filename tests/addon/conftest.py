@@ -68,6 +68,23 @@ def add_mesh(bpy, add):
 
 
 @pytest.fixture
+def linked(blender):
+    """Function: save the open file, and link the results of the run in it, "Scan VAD", into a new one."""
+
+    def linked():
+        path = blender.data.filepath
+        blender.ops.wm.save_mainfile()
+        blender.ops.wm.read_homefile(use_empty=True)
+        with blender.data.libraries.load(path, link=True) as (_, wanted):
+            wanted.collections = ["Scan VAD"]
+        collection = blender.data.collections["Scan VAD"]
+        blender.context.scene.collection.children.link(collection)
+        return collection
+
+    return linked
+
+
+@pytest.fixture
 def sphere():
     """(500,3) points of the unit sphere, on a Fibonacci spiral."""
     z = 1 - (2 * np.arange(500) + 1) / 500

@@ -55,34 +55,23 @@ def test_without_the_file_of_the_volume_they_say_so_and_leave_nothing(blender, r
 
 @pytest.mark.parametrize("how", ["excluded", "unlinked", "linked"])
 @pytest.mark.parametrize("operator", ["shell", "slice", "normals_to_geometry"])
-def test_results_that_take_no_more_objects_say_so(blender, result, tmp_path, operator, how):
+def test_results_that_take_no_more_objects_say_so(blender, result, linked, operator, how):
     collection, layer = blender.context.scene.vad.result, blender.context.view_layer
     if how == "excluded":
         layer.layer_collection.children[collection.name].exclude = True
     elif how == "unlinked":
         blender.context.scene.collection.children.unlink(collection)
     else:
-        collection = linked(blender, tmp_path)
+        blender.context.view_layer.objects.active = linked().objects["Scan surface"]
     before = set(blender.data.objects)
     with pytest.raises(RuntimeError, match="make it local" if how == "linked" else "include it in the outliner"):
         getattr(blender.ops.vad, operator)()
     assert set(blender.data.objects) == before
 
 
-def linked(bpy, folder):
-    """The results of the run, linked into another file, the surface active."""
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.read_homefile(use_empty=True)
-    with bpy.data.libraries.load(str(folder / "scene.blend"), link=True) as (_, wanted):
-        wanted.collections = ["Scan VAD"]
-    collection = bpy.data.collections["Scan VAD"]
-    bpy.context.scene.collection.children.link(collection)
-    bpy.context.view_layer.objects.active = collection.objects["Scan surface"]
-    return collection
-
-
-def test_what_is_extracted_again_of_linked_results_lies_beside_them(blender, result, tmp_path):
-    collection = linked(blender, tmp_path)
+def test_what_is_extracted_again_of_linked_results_lies_beside_them(blender, result, linked):
+    collection = linked()
+    blender.context.view_layer.objects.active = collection.objects["Scan surface"]
     before = {obj.name: obj.data for obj in collection.objects}
     assert blender.ops.vad.reextract(resolution=24) == {"FINISHED"}
     assert {obj.name: obj.data for obj in collection.objects} == before

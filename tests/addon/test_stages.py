@@ -342,16 +342,10 @@ def test_extracting_again_after_transforms_were_applied_stays_in_place(blender, 
         assert np.median(radii(by_role(blender)[role])) == pytest.approx(1, abs=0.05)
 
 
-def test_extracting_again_leaves_linked_results_alone(blender, scan, folder):
+def test_extracting_again_leaves_linked_results_alone(blender, scan, linked):
     """Making a linked collection local leaves what is in it linked."""
     blender.ops.vad.reconstruct(resolution=24)
-    blender.ops.wm.save_mainfile()
-    blender.ops.wm.read_homefile(use_empty=True)
-    with blender.data.libraries.load(str(folder / "scene.blend"), link=True) as (_, wanted):
-        wanted.collections = ["Scan VAD"]
-    collection = blender.data.collections["Scan VAD"]
-    blender.context.scene.collection.children.link(collection)
-    local = collection.make_local()
+    local = linked().make_local()
     before = {obj.name: obj.data for obj in local.objects}
     blender.context.view_layer.objects.active = local.objects["Scan surface"]
     assert blender.ops.vad.reextract(resolution=24) == {"FINISHED"}
