@@ -78,6 +78,16 @@ def test_a_sparse_sheet_behind_a_dense_one_stays(gap, apart):
     assert find_outliers(points)[len(front) :].mean() < 0.15
 
 
+def test_a_few_strays_that_lie_in_a_plane_by_chance_are_found():
+    """After the first round most of those left do, and are no sheet behind another for that."""
+    corners = [((0, 0, 0), (1, 1, 0)), ((0, 0, 0), (0, 1, 1)), ((0, 0, 0), (1, 0, 1))]
+    walls, found = shapes.scattered_rectangles(corners, 3000), []
+    for seed in range(8):
+        strays = np.random.default_rng(seed).uniform(-0.05, 1.05, (60, 3))
+        found.append(find_outliers(np.vstack([walls, strays]))[len(walls) :].mean())
+    assert np.mean(found) > 0.925
+
+
 def test_chunks_change_nothing(monkeypatch):
     rng = np.random.default_rng(1)
     clumps = np.repeat(rng.uniform(-2, 2, (30, 3)), 10, axis=0) + rng.normal(size=(300, 3)) * 0.03
