@@ -1,5 +1,6 @@
 """Us against the peers, case by case, and what that adds up to."""
 
+import operator
 import statistics
 from collections.abc import Iterator
 
@@ -14,6 +15,12 @@ SHARE = 0.85  # of the clean cases, at least, with the lowest CD
 OURS = {"double": "VAD, double cover", "single": "VAD, single layer"}
 FINE = {"fine": "VAD, double cover, finer grid"}
 _DEFAULT = "double"
+_MEASURES = {
+    "hd": ("the lowest HD", operator.le),
+    "nc": ("the highest NC", operator.ge),
+    "f005": ("the highest F@.005", operator.ge),
+    "f010": ("the highest F@.010", operator.ge),
+}
 _COLUMNS = {
     "cd": "{:.3f}",
     "hd": "{:.1f}",
@@ -40,9 +47,19 @@ def best_peer(result: dict) -> str | None:
     return min(made, key=made.get) if made else None
 
 
+def shown(results: list[dict]) -> list[dict]:
+    """The results with our closed surface that peers were run on, too."""
+    return [result for result in results if "mesh" in result and result.get("peers")]
+
+
 def compared(results: list[dict]) -> list[dict]:
-    """The results that can be compared: with our closed surface and that of at least one peer."""
-    return [result for result in results if "mesh" in result and "peers" in result and best_peer(result)]
+    """Those of them that can be compared: with the surface of at least one peer."""
+    return [result for result in shown(results) if best_peer(result)]
+
+
+def over_best(result: dict, ours: str = _DEFAULT) -> float:
+    """The CD of one of our surfaces over that of the best peer."""
+    return contenders(result)[ours]["cd"] / result["peers"][best_peer(result)]["cd"]
 
 
 def verdicts(results: list[dict]) -> Iterator[str]:
@@ -53,8 +70,8 @@ def verdicts(results: list[dict]) -> Iterator[str]:
         return
     finer = FINE if any(name in result for name in FINE for result in clean) else {}
     for name, title in (OURS | finer).items():
-        ratios = {r["case"]: _ratio(r, name if name in contenders(r) else _DEFAULT) for r in clean}
-        won = sum(ratio <= 1 for ratio in ratios.values())
+        ratios = {r["case"]: over_best(r, name if name in contenders(r) else _DEFAULT) for r in clean}
+        won = sum(ratio < 1 for ratio in ratios.values())
         worst = max(ratios, key=ratios.get)
         word = ""
         if name in finer:
@@ -65,9 +82,11 @@ def verdicts(results: list[dict]) -> Iterator[str]:
             f"{word}{title}: the lowest CD on {won} of {len(clean)} clean cases ({won / len(clean):.0%}; {SHARE:.0%} "
             f"is asked); at worst {ratios[worst]:.2f} × the best peer's, on {worst} (at most {WORSE_BY} is asked)."
         )
+    yield f"VAD, double cover, of these {len(clean)} by the other measures: {_firsts(clean)}."
+    if alone := [result["case"] for result in shown(results) if not best_peer(result)]:
+        yield f"Not counted, as no peer came to an end there: {', '.join(alone)}."
     for result in compared(results):
-        ratio = _ratio(result, _DEFAULT)
-        if ratio > 1:
+        if over_best(result) >= 1:
             kind = "" if result["category"] not in SPOILED else f", {result['category']}"
             yield (
                 f"Lost: {result['case']}{kind}: CD {result['mesh']['cd']:.3f}, single layer "
@@ -80,13 +99,19 @@ def _listed_cases(results, name):
     return ", ".join(result["case"] for result in results if name in result)
 
 
-def _ratio(result, ours):
-    return contenders(result)[ours]["cd"] / result["peers"][best_peer(result)]["cd"]
+def _firsts(results):
+    """On how many of them no peer, each with the variant of its lowest CD, is ahead of our double cover, by measure."""
+    said = []
+    for key, (what, ahead) in _MEASURES.items():
+        others = [[found[key] for found in result["peers"].values() if key in found] for result in results]
+        won = sum(all(ahead(r["mesh"][key], x) for x in o) for r, o in zip(results, others, strict=True))
+        said.append(f"{what} on {won}")
+    return ", ".join(said)
 
 
 def peer_tables(results: list[dict], level: int = 2) -> str:
     """Verdicts and both tables under a heading of the level; empty where there is nothing to compare."""
-    if not compared(results):
+    if not shown(results):
         return ""
     said = "\n".join(f"- {line}" for line in verdicts(results))
     parts = [f"{'#' * level} Against the peers", said, overview(results), full_table(results)]
@@ -98,17 +123,19 @@ def alone_section(found: dict[str, dict]) -> str:
     times = {case: times for case, times in found.items() if "ratio" in times}
     if not times:
         return ""
+    failed = [case for case in found if case not in times]
     lines = [["case", "VAD, s", "CPU s", "Poisson, s", "CPU s", "clock", "CPU", "load before"], ["---"] + ["---:"] * 7]
     for case, measured in times.items():
         spent = [f"{measured[way][key]:.2f}" for way in ("ours", "poisson") for key in ("seconds", "cpu")]
         ratios = [f"{measured['ratio'][key]:.2f}" for key in ("seconds", "cpu")]
         lines.append([case, *spent, *ratios, ABSENT if measured["load"] is None else f"{measured['load']:.1f}"])
-    said = "\n".join(f"- {_within(times, key, name)}" for key, name in (("seconds", "By the clock"), ("cpu", "CPU")))
+    said = [_within(times, key, name) for key, name in (("seconds", "By the clock"), ("cpu", "CPU"))]
+    said = "\n".join(f"- {line}" for line in (*said, *([f"**Failed**: {', '.join(failed)}."] if failed else [])))
     return f"""\
 ## Time
 
 Our whole run over Open3D's normals, orientation and Poisson on the same points, in turn, with nothing else of this
-bench running: medians. *load*: processes at work on the machine in the minute before, which slow both.
+bench running: medians. *load*: processes at work on the machine in the minute before, this bench's own among them.
 
 {said}
 
@@ -130,17 +157,17 @@ def overview(results: list[dict]) -> str:
     """CD of every way on every case, the lowest in bold, as a Markdown table."""
     titles = _titles(results)
     lines = [["case", *titles.values(), "double cover / best peer"], ["---", *("---:" for _ in titles), "---:"]]
-    for result in compared(results):
+    for result in shown(results):
         found = contenders(result)
         lowest = min(measures["cd"] for measures in found.values() if "cd" in measures)
         cells = [_cd(found.get(name, {}), lowest) for name in titles]
-        lines.append([result["case"], *cells, f"{_ratio(result, _DEFAULT):.2f}"])
+        lines.append([result["case"], *cells, f"{over_best(result):.2f}" if best_peer(result) else ABSENT])
     return markdown_rows(lines)
 
 
 def _cd(measures, lowest):
     if "cd" not in measures:
-        return "failed" if "error" in measures else ABSENT
+        return ABSENT if "error" not in measures else "too slow" if measures.get("too_slow") else "failed"
     return f"**{measures['cd']:.3f}**" if measures["cd"] == lowest else f"{measures['cd']:.3f}"
 
 
@@ -148,12 +175,12 @@ def full_table(results: list[dict]) -> str:
     """CD, HD, NC of the surface, time and memory of every way on every case, as a Markdown table."""
     titles = _titles(results)
     lines = [["case", "way", "variant", "CD", "HD", "NC", "seconds", "CPU", "MB"], ["---"] * 3 + ["---:"] * 6]
-    for result in compared(results):
+    for result in shown(results):
         for name, found in contenders(result).items():
             if "error" in found:
                 lines.append([result["case"], titles[name], found["error"], *[ABSENT] * 6])
                 continue
-            variant = ABSENT if found["variant"] is None else str(found["variant"]).strip("()[]")
+            variant = found["variant"] or ABSENT
             numbers = [form.format(found[key]) for key, form in _COLUMNS.items()]
             lines.append([result["case"], titles[name], variant, *numbers])
     return markdown_rows(lines)
@@ -173,6 +200,6 @@ def _listed(variants):
 
 
 def _titles(results):
-    run = {name for result in compared(results) for name in result["peers"]}
-    finer = FINE if any(name in result for name in FINE for result in compared(results)) else {}
+    run = {name for result in shown(results) for name in result["peers"]}
+    finer = FINE if any(name in result for name in FINE for result in shown(results)) else {}
     return OURS | finer | {name: peer.title for name, peer in PEERS.items() if name in run}

@@ -1,8 +1,6 @@
 """docs/field.md: `python -m benchmarks.field FOLDER` measures the distance field and writes the page."""
 
-import platform
 import sys
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +21,7 @@ from .field_rims import rims
 from .field_verdicts import verdicts
 from .peers import check_open3d
 from .status import page_command, said
+from .versions import listed, versions
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CLOSED, OPEN, BAND = "spot_10k", "cloth_10k", "moebius_5k"
@@ -161,7 +160,7 @@ def measure(folder: Path) -> tuple[dict, dict]:
     along, line_pictures = said("lines", lines())
     level_sets = {case.name: said(f"offsets of {case.name}", offsets(case)) for case in (closed, opened)}
     numbers = {
-        "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+        "versions": versions(_LIBRARIES),
         "lines": along,
         "offsets": [rows for rows, _ in level_sets.values()],
         "rims": said("rims", rims([opened, band])),
@@ -194,7 +193,7 @@ def write_page(numbers: dict, pictures: dict, docs: Path) -> Path:
     write_report(folder / "numbers.json", numbers)
     write_plots(numbers, pictures, folder)
     text = _PAGE.format(
-        versions=", ".join(f"{name} {number}" for name, number in numbers["versions"].items()),
+        versions=listed(numbers["versions"]),
         verdicts="\n".join(f"- {line}" for line in verdicts(numbers)),
         quality="\n\n".join(_quality(sampling, results) for sampling, results in numbers["quality"].items()),
         closed=CLOSED,

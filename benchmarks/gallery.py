@@ -19,6 +19,7 @@ from .peers import PEERS, check_open3d
 from .pictures import View, caption, draw_distances, draw_errors, draw_points, draw_surface, error_scale, save, sheet
 from .sampling import blue_noise, pierced, uniform
 from .shapes import bordered, closed, junctions, one_sided
+from .starts import USUAL
 from .status import DONE, exit_status
 from .steps import cuts, pipeline, rounds
 
@@ -127,7 +128,8 @@ def lost(path: Path) -> Path:
     surface = closed.bumps()
     points, _ = blue_noise(surface, 100_000, np.random.default_rng(0))
     peer, worst, camera = PEERS["pivoting"], 0.1, View().camera(points, _PIXELS)
-    meshes = {"VAD": reconstruct(points).surface, peer.title: peer.finish(peer.prepare(points), peer.variants[0])}
+    other = peer.finish(peer.prepare(points, USUAL), peer.variants[0])
+    meshes = {"VAD": reconstruct(points).surface, peer.title: other}
     figure, (panels,) = sheet(1, len(meshes))
     for panel, (way, mesh) in zip(panels, meshes.items(), strict=True):
         draw_distances(panel, mesh, surface.mesh, worst * 1e-3, camera)

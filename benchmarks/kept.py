@@ -10,10 +10,12 @@ from core.io.atomic import writable_folder
 from core.io.report import write_report
 
 _ROOT = Path(__file__).resolve().parent.parent
-_MEASURES = ("cases", "metrics", "geometry", "processes", "peers")
+_MEASURES = ("cases", "metrics", "geometry", "processes", "peers", "starts")
 OURS = ("core/**/*.py", *(f"benchmarks/{name}.py" for name in (*_MEASURES, "run", "field_metrics")))
+ALONE = (*OURS, "benchmarks/alone.py")
 PEERS = tuple(f"benchmarks/{name}.py" for name in (*_MEASURES, "measure_peers"))
-_LIBRARIES = {OURS: ("numpy", "scipy", "libigl"), PEERS: ("numpy", "libigl", "open3d", "cgal")}
+_OURS = "numpy", "scipy", "libigl", "scikit-image", "bpy"
+_LIBRARIES = {OURS: _OURS, ALONE: (*_OURS, "open3d"), PEERS: ("numpy", "libigl", "open3d", "cgal")}
 
 
 def code_version(sources: tuple[str, ...]) -> str:

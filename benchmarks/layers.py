@@ -18,10 +18,12 @@ from .geometry import face_normals, surface_samples
 from .metrics import surface_errors
 from .peers import check_open3d
 from .status import page_command
+from .versions import listed, versions
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PERCENTILES = (1, 25, 50, 75, 99)
 
+_LIBRARIES = "numpy", "scipy", "open3d"
 _COUNT = 60_000  # points
 _REACH = 0.75  # cells, farther sheets are others
 _OPPOSITE = -0.5  # largest cosine between the normals of either layer
@@ -30,7 +32,7 @@ _PAGE = """\
 # The two layers of the double cover
 
 Made by `python -m benchmarks.layers FOLDER`, which writes this page and the numbers behind it
-([numbers.json](layers/numbers.json)); do not edit it by hand.
+([numbers.json](layers/numbers.json)); do not edit it by hand. {versions}.
 
 The layers are mostly both sides of the single layer, a hair apart: 3e-4 cells. Elsewhere (sheets cross and points do
 not show where, others run side by side, points are sparse or dense) they are extracted at an offset and pulled onto
@@ -40,14 +42,15 @@ mesh bends sharply at the middles of edges. A viewer that colours back faces sho
 programs that ask for meshes that do not cross themselves refuse them.
 
 *Gap*: how far the layer behind lies from points of the other, percentiles in cells; negative where it lies in front.
-*Crossed*: share of the points where it does: along lines where the surface itself crosses, and where points are too few
+*Paired*: share of the points that have one within .75 cell; of the others nothing is told. *Crossed*: share of those
+where it lies in front: along lines where the surface itself crosses, and where points are too few
 to tell thin parts from folds. *Astride*: the same for layers extracted at an offset with each face put astride the
 surface, as it is where the median distance of the points is less than two thirds of a cell: then errors of the chords
 are most of all there are, and twice as large for layers that lie apart. There, and of the sides of a single layer,
 whose faces lie astride as well, the column is empty. CD is times 1000, in the scale of the case.
 
-| case | points | crossed | {percentiles} | crossed, astride | CD | CD astride | ratio |
-| --- | --- | ---: | {rules} | ---: | ---: | ---: | ---: |
+| case | points | paired | crossed | {percentiles} | crossed, astride | CD | CD astride | ratio |
+| --- | --- | ---: | ---: | {rules} | ---: | ---: | ---: | ---: |
 {rows}
 """
 
@@ -85,6 +88,7 @@ def _told(case):
     result = reconstruct(case.points, Settings())
     found = gaps(result.surface, result.field.spacing)
     return {
+        "paired": len(found) / _COUNT,
         "crossed": float((found < 0).mean()),
         "gap": np.percentile(found, PERCENTILES).tolist(),
         "cd": surface_errors(result.surface, case.truth)["cd"],
@@ -114,9 +118,11 @@ def gaps(mesh: Mesh, cell: float, seed: int = 0) -> np.ndarray:
 
 def write_page(rows: list[dict], docs: Path) -> Path:
     """Write layers.md and the numbers into the folder `docs`. Returns the page."""
-    write_report(writable_folder(docs / "layers") / "numbers.json", {"rows": rows})
+    measured_with = versions(_LIBRARIES)
+    write_report(writable_folder(docs / "layers") / "numbers.json", {"versions": measured_with, "rows": rows})
     page = docs / "layers.md"
     text = _PAGE.format(
+        versions=listed(measured_with),
         percentiles=" | ".join(f"gap, {p} %" for p in PERCENTILES),
         rules=" | ".join("---:" for _ in PERCENTILES),
         rows="\n".join(map(_row, rows)),
@@ -132,8 +138,8 @@ def _row(row):
     crossed, *errors = ("–",) * 3
     if astride is not None:
         crossed, *errors = f"{row['crossed_astride']:.1%}", f"{astride:.3f}", f"{cd / astride:.2f}"
-    cells = [row["case"], row["sampling"], f"{row['crossed']:.2%}", gap, crossed, f"{cd:.3f}", *errors]
-    return f"| {' | '.join(cells)} |"
+    shares = f"{row['paired']:.1%}", f"{row['crossed']:.2%}"
+    return f"| {' | '.join([row['case'], row['sampling'], *shares, gap, crossed, f'{cd:.3f}', *errors])} |"
 
 
 if __name__ == "__main__":

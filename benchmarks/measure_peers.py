@@ -1,65 +1,90 @@
 """Peers on one case."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
+from core import Mesh
 from core.memory import peak_memory_mb
 
 from .cases import load_case
 from .metrics import surface_errors
-from .peers import PEERS, median_clock, timed
+from .peers import PEERS, Clock, median_clock, timed
+from .starts import Start, readied, starts
 
-_TRIAL_SAMPLES = 10_000  # a side, to choose a variant by
+_TRIAL_SAMPLES = 10_000  # a side, to choose a start and a variant by
 _FAILURES = (RuntimeError, ValueError)
 
 
 def measure_peers(names: list[str], path: Path, sampling: str, repeats: int) -> dict[str, dict]:
-    """Errors, time and memory of peers that start alike, by name; one that fails has only the key `error`.
+    """Errors, time and memory of peers that start alike, by name; one that always fails has only the key `error`.
 
-    Of a peer's variants the one with the lowest CD counts, chosen with the truth at hand.
+    Of the ways to start and of a peer's variants those with the lowest CD count, chosen with the truth at hand.
 
     seconds, cpu : the preparation plus the rest with that variant, either of median time
-    memory_mb    : what the preparation and all variants of all of these peers added to the memory of the process
-    variant      : the parameter chosen, None where there is none
+    memory_mb    : what the first preparation and all variants after it, of all of these peers, added to the memory of
+                   the process
+    variant      : how it started and the parameter chosen, as text
     """
-    case, prepare = load_case(path, sampling), PEERS[names[0]].prepare
+    case, peer = load_case(path, sampling), PEERS[names[0]]
     before = peak_memory_mb()
-    prepared, preparing = timed(prepare, case.points)
-    trials = {name: _tried(PEERS[name], prepared) for name in names}
-    memory = peak_memory_mb() - before
-    preparing = median_clock(preparing, lambda: prepare(case.points), repeats)
-    measured = {}
-    for name, tried in trials.items():
+    memory, tried, failed = None, {name: [] for name in names}, {}
+    for start in starts(case.meta["category"], len(case.points), peer.normals, peer.octree):
         try:
-            variant, mesh, clock = _best(tried, case.truth)
+            prepared, preparing = timed(_prepared, peer, case.points, start)
         except _FAILURES as error:
-            measured[name] = {"error": f"{type(error).__name__}: {error}"}
+            failed = dict.fromkeys(names, error) | failed
             continue
-        clock = median_clock(clock, lambda: PEERS[name].finish(prepared, variant), repeats)  # noqa: B023 - called here
-        measured[name] = {
-            **surface_errors(mesh, case.truth),
-            "variant": variant,
-            "seconds": preparing.seconds + clock.seconds,
-            "cpu": preparing.cpu + clock.cpu,
-            "memory_mb": memory,
-        }
-    return measured
+        for name in names:
+            for variant in PEERS[name].variants:
+                try:
+                    mesh, clock = timed(PEERS[name].finish, prepared, variant)
+                    if not len(mesh.faces):
+                        raise ValueError("it made no triangle")
+                    tried[name].append(_Trial(start, variant, mesh, prepared, preparing, clock))
+                except _FAILURES as error:
+                    failed.setdefault(name, error)
+        if memory is None:
+            memory = peak_memory_mb() - before
+    return {
+        name: _measured(name, trials, case, repeats, memory) if trials else {"error": _line(failed[name])}
+        for name, trials in tried.items()
+    }
 
 
-def _tried(peer, prepared):
-    """(variant, mesh, clock) of every variant, or the error that one of them ended with."""
-    try:
-        return [(variant, *timed(peer.finish, prepared, variant)) for variant in peer.variants]
-    except _FAILURES as error:
-        return error
+@dataclass(frozen=True)
+class _Trial:
+    """A peer's mesh, what it was made of, and the time of either part."""
+
+    start: Start
+    variant: object
+    mesh: Mesh
+    prepared: object
+    preparing: Clock
+    clock: Clock
 
 
-def _best(tried, truth):
-    """The one of `tried` with the lowest CD. Raises what :func:`_tried` met, or ValueError where there is no mesh."""
-    if isinstance(tried, Exception):
-        raise tried
-    made = [trial for trial in tried if len(trial[1].faces)]
-    if not made:
-        raise ValueError("it made no triangle")
-    if len(made) == 1:
-        return made[0]
-    return min(made, key=lambda trial: surface_errors(trial[1], truth, count=_TRIAL_SAMPLES)["cd"])
+def _prepared(peer, points, start):
+    return peer.prepare(readied(points, start), start)
+
+
+def _measured(name, trials, case, repeats, memory):
+    peer, best = PEERS[name], trials[0]
+    if len(trials) > 1:
+        best = min(trials, key=lambda trial: surface_errors(trial.mesh, case.truth, count=_TRIAL_SAMPLES)["cd"])
+    preparing = median_clock(best.preparing, lambda: _prepared(peer, case.points, best.start), repeats)
+    clock = median_clock(best.clock, lambda: peer.finish(best.prepared, best.variant), repeats)
+    return {
+        **surface_errors(best.mesh, case.truth),
+        "variant": "; ".join(filter(None, (str(best.start), _text(best.variant)))) or None,
+        "seconds": preparing.seconds + clock.seconds,
+        "cpu": preparing.cpu + clock.cpu,
+        "memory_mb": memory,
+    }
+
+
+def _text(variant):
+    return "" if variant is None else str(variant).strip("()[]")
+
+
+def _line(error):
+    return f"{type(error).__name__}: {error}"

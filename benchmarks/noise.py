@@ -2,11 +2,9 @@
 
 import argparse
 import os
-import platform
 import sys
 import time
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +21,6 @@ from .noise_hostile import RESOLUTION, fuzzed, tried
 from .noise_measure import (
     FAINT,
     HALF_NOISE,
-    JET_NEIGHBOURS,
     MORE,
     NOISE,
     NOISE_OF_MORE,
@@ -48,7 +45,9 @@ from .noise_silence import NOISE as SILENCE_NOISE
 from .noise_silence import POINTS as SILENCE_POINTS
 from .noise_silence import RUNS, STOPS, silences, sphere, stops
 from .peers import check_open3d
+from .starts import JET_NEIGHBOURS
 from .status import DONE, exit_status, said
+from .versions import listed, versions
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 CASES = ["spot_10k", "cloth_10k", "moebius_5k"]
@@ -247,7 +246,7 @@ def measure(cases: list[Case], others: list[Path], shape: Path) -> dict:
     alone, `shape` costs with more settings."""
     check_open3d()
     return {
-        "versions": {"Python": platform.python_version(), **dict(_versions())},
+        "versions": versions(_LIBRARIES),
         "hostile": said("bad input", tried()),
         "fuzz": said("fuzz", fuzzed()),
         "clean": dict(said("clean cases", list(_clean(others)))),
@@ -303,14 +302,6 @@ def _stopping():
     return {"silences": silent, "stops": stopped, "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None}
 
 
-def _versions():
-    for name in _LIBRARIES:
-        try:
-            yield name, version(name)
-        except PackageNotFoundError:
-            yield name, "not installed"
-
-
 def write_page(measured: dict, docs: Path) -> Path:
     """Write noise.md, its plot and its numbers into the folder `docs`. Returns the page."""
     folder, page = writable_folder(docs / "noise"), docs / "noise.md"
@@ -319,7 +310,7 @@ def write_page(measured: dict, docs: Path) -> Path:
     plot_noise(folder / "noise.png", shape, measured["categories"][SHAPE])
     fuzz = measured["fuzz"]
     text = _PAGE.format(
-        versions=", ".join(f"{name} {number}" for name, number in measured["versions"].items()),
+        versions=listed(measured["versions"]),
         verdicts="\n".join(f"- {line}" for line in verdicts(measured)),
         longest=LONGEST_MOVE,
         settled=SETTLED,

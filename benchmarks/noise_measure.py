@@ -18,6 +18,7 @@ from .geometry import closest_points, face_normals, surface_samples
 from .metrics import surface_errors, topology
 from .peers import PEERS, Clock, poisson
 from .processes import Failed, run_fresh
+from .starts import smoothed
 
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 MORE, NOISE_OF_MORE = (10_000, 30_000, 100_000), (0.5, 1.0, 2.0)  # points; per cent of the longest side
@@ -29,7 +30,6 @@ SHIFTS = (0.05, 0.1, 0.2, 0.3, 0.5)  # local spacings
 WALLS = (0.1, 0.2, 0.3, 0.5, 1.0)  # local spacings
 STRAYS = (0.0, 0.02, 0.05, 0.2)  # per sample
 PCA_NEIGHBOURS = (6, 8, 12, 16, 24, 36, 48, 80)
-JET_NEIGHBOURS = 24
 MARGIN = 1.1  # strays fill the box of the object, this much enlarged
 
 _SHIFTED_BY = np.array([0.33, 0.44, 0.835])  # direction, which no case has for an axis
@@ -286,16 +286,8 @@ def _poisson(case, points):
 
 def _jet(case, points):
     """CGAL's jet smoothing, then its advancing front."""
-    from CGAL.CGAL_Kernel import Point_3
-    from CGAL.CGAL_Point_set_3 import Point_set_3
-    from CGAL.CGAL_Point_set_processing_3 import jet_smooth_point_set
-
     with Clock() as clock:
-        cloud = Point_set_3()
-        for x, y, z in points.tolist():
-            cloud.insert(Point_3(x, y, z))
-        jet_smooth_point_set(cloud, JET_NEIGHBOURS)
-        moved = np.array([[point.x(), point.y(), point.z()] for point in cloud.points()])
+        moved = smoothed(points)
         mesh = PEERS["front"].finish(moved, None)
     return {"after": _distance(moved, case.truth), "cpu": clock.cpu, **cd_and_hd(mesh, case.truth)}
 

@@ -1,9 +1,7 @@
 """docs/normals.md: `python -m benchmarks.normals FOLDER` measures the axes of stage one and writes the page."""
 
-import platform
 import sys
 from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +29,7 @@ from .plots import plot_convergence, plot_growth
 from .report import Column, markdown_table
 from .status import page_command, said
 from .tables import markdown_rows
+from .versions import listed, versions
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -138,7 +137,7 @@ def measure(folder: Path) -> dict:
     check_open3d()
     paths, (shape,) = find_cases(folder), find_cases(folder, [SHAPE])
     return {
-        "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+        "versions": versions(_LIBRARIES),
         "quality": {sampling: list(_qualities(paths, sampling)) for sampling in SAMPLINGS},
         "ablation": said("ablation", ablation(load_case(shape))),
         "convergence": said("convergence", convergence(load_case(shape, "blue noise"))),
@@ -159,7 +158,7 @@ def write_page(measured: dict, docs: Path) -> Path:
     plot_convergence(folder / "convergence.png", measured["convergence"], float(np.degrees(TOLERANCE)))
     plot_growth(folder / "growth.png", measured["cost"])
     text = _PAGE.format(
-        versions=", ".join(f"{name} {number}" for name, number in measured["versions"].items()),
+        versions=listed(measured["versions"]),
         default=_triple(EnergyWeights()),
         printed=_triple(PRINTED),
         verdicts="\n".join(f"- {line}" for line in verdicts(measured)),

@@ -13,8 +13,9 @@ from scipy.spatial import Delaunay, KDTree
 
 from core import Mesh, MissingDependency
 
+from .starts import USUAL, oriented, point_set
+
 SHORT = 5.0  # seconds of CPU time: what takes less is worth repeating to time it
-_PCA_NEIGHBOURS, _ORIENTATION_NEIGHBOURS, _DEPTH = 30, 15, 8
 
 
 class Clock:
@@ -57,13 +58,20 @@ def delaunay_seconds(points: np.ndarray) -> float:
 def poisson(points: np.ndarray) -> tuple[Mesh, np.ndarray, "Clock"]:
     """Open3D: PCA normals over 30 neighbours, oriented along tangent planes over 15, Poisson at depth 8.
 
-    Returns the mesh, the normals (n,3) and the time of the three steps. Raises :class:`MissingDependency`.
+    Returns the mesh, the normals (n,3) and the time of the three steps, without that of loading the library. Raises
+    :class:`MissingDependency`.
     """
-    check_open3d()
+    load_open3d()
     with Clock() as clock:
-        cloud = _oriented(points)
-        mesh, _ = _screened_poisson(cloud)
+        cloud = oriented(points, USUAL.neighbours)
+        mesh, _ = _screened_poisson(cloud, USUAL.depth)
     return _mesh(mesh), np.asarray(cloud.normals), clock
+
+
+def load_open3d() -> None:
+    """Raises :class:`MissingDependency` where that fails."""
+    check_open3d()
+    import open3d  # noqa: F401
 
 
 @cache
@@ -87,10 +95,11 @@ class Peer:
 
     title    : for tables     how : what is run, in a sentence
     module   : the library it needs
-    prepare  : points (n,3) -> whatever all variants start from; peers that share it run in one process
+    prepare  : (points (n,3), Start) -> whatever all variants start from; peers that share it run in one process
     finish   : (that, variant) -> Mesh
     variants : values of its parameter to choose from; (None,) where it has none
     unit     : what the parameter is
+    normals, octree : whether it starts from normals, and from Poisson's octree
     first_step : what it spends long on before anything else, where others do so, too
     """
 
@@ -101,6 +110,8 @@ class Peer:
     finish: Callable
     variants: tuple = (None,)
     unit: str = ""
+    normals: bool = False
+    octree: bool = False
     first_step: str = ""
 
     @property
@@ -108,23 +119,14 @@ class Peer:
         return find_spec(self.module) is not None
 
 
-def _oriented(points):
+def _poisson_from(points, start):
+    return _screened_poisson(oriented(points, start.neighbours), start.depth)
+
+
+def _screened_poisson(cloud, depth):
     import open3d
 
-    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
-    cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(_PCA_NEIGHBOURS))
-    cloud.orient_normals_consistent_tangent_plane(_ORIENTATION_NEIGHBOURS)
-    return cloud
-
-
-def _poisson_from(points):
-    return _screened_poisson(_oriented(points))
-
-
-def _screened_poisson(cloud):
-    import open3d
-
-    return open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=_DEPTH)
+    return open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth)
 
 
 def _trim(poisson, share):
@@ -144,7 +146,11 @@ def _roll_balls(prepared, radii):
     return _mesh(open3d.geometry.TriangleMesh.create_from_point_cloud_ball_pivoting(cloud, sizes))
 
 
-def _tetrahedra(points):
+def _balls(points, start):
+    return oriented(points, start.neighbours), _spacing(points)
+
+
+def _tetrahedra(points, _):
     import open3d
 
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
@@ -160,16 +166,15 @@ def _alpha_shape(prepared, multiple):
     )
 
 
+def _as_they_are(points, _):
+    return points
+
+
 def _advancing_front(points, _):
     from CGAL.CGAL_Advancing_front_surface_reconstruction import advancing_front_surface_reconstruction
-    from CGAL.CGAL_Kernel import Point_3
-    from CGAL.CGAL_Point_set_3 import Point_set_3
 
-    cloud, faces = Point_set_3(), []
-    cloud.reserve(len(points))
-    for x, y, z in points.tolist():
-        cloud.insert(Point_3(x, y, z))
-    advancing_front_surface_reconstruction(cloud, faces)
+    faces = []
+    advancing_front_surface_reconstruction(point_set(points), faces)
     return Mesh(points, np.array(faces, np.int32).reshape(-1, 3))
 
 
@@ -182,15 +187,15 @@ def _mesh(mesh):
     return Mesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
 
 
-_NORMALS = f"PCA normals ({_PCA_NEIGHBOURS} neighbours), oriented along tangent planes ({_ORIENTATION_NEIGHBOURS})"
-
 PEERS = {
     "poisson": Peer(
         "Poisson",
-        f"Open3D: {_NORMALS}, screened Poisson reconstruction at depth {_DEPTH}",
+        "Open3D: oriented PCA normals, screened Poisson reconstruction",
         "open3d",
         _poisson_from,
         lambda poisson, _: _mesh(poisson[0]),
+        normals=True,
+        octree=True,
         first_step="orientation",
     ),
     "trimmed": Peer(
@@ -201,17 +206,20 @@ PEERS = {
         _trim,
         (0.01, 0.03, 0.1, 0.2, 0.4),
         "share of vertices dropped",
-        "orientation",
+        normals=True,
+        octree=True,
+        first_step="orientation",
     ),
     "pivoting": Peer(
         "ball pivoting",
-        f"Open3D: {_NORMALS}, ball pivoting",
+        "Open3D: oriented PCA normals, ball pivoting",
         "open3d",
-        lambda points: (_oriented(points), _spacing(points)),
+        _balls,
         _roll_balls,
         ((2, 4), (1.5, 3, 6), (3, 6, 12)),
         "radii in mean distances to the nearest point",
-        "orientation",
+        normals=True,
+        first_step="orientation",
     ),
     "alpha": Peer(
         "alpha shape",
@@ -226,7 +234,7 @@ PEERS = {
         "advancing front",
         "CGAL: advancing front surface reconstruction at its defaults",
         "CGAL",
-        lambda points: points,
+        _as_they_are,
         _advancing_front,
     ),
 }

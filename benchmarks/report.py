@@ -142,12 +142,34 @@ def _width(column):
 
 
 def markdown_tables(results: list[dict], level: int = 2) -> str:
-    """Every table of TABLES whose first column has a value, under headings of the level."""
+    """Every table of TABLES whose first column has a value, under headings of the level, with what it adds up to."""
     parts = []
     for title, columns in TABLES.items():
         if any(columns[0].values(result)[0] is not None for result in results):
             parts += [f"{'#' * level} {title}", markdown_table(results, columns)]
+            parts += [_NOTES[title](results)] if title in _NOTES else []
     return "\n\n".join(parts) + "\n"
+
+
+def _right_covers(results):
+    meshes = [result["mesh"] for result in results if "mesh" in result]
+    asked = [mesh["euler_error"] for mesh in meshes if mesh["euler_error"] is not None]
+    closed = sum(mesh["border_edges"] == mesh["nonmanifold_edges"] == 0 for mesh in meshes)
+    return (
+        f"Two faces at every edge on {closed} of {len(meshes)} cases; the Euler number as expected on {asked.count(0)} "
+        f"of the {len(asked)} that have one."
+    )
+
+
+def _right_sheets(results):
+    sheets = [result["sheet"] for result in results if "sheet" in result]
+    euler, loops = (sum(sheet[key] == sheet[f"{key}_expected"] for sheet in sheets) for key in ("euler", "loops"))
+    return (
+        f"The Euler number of the true mesh on {euler}, its number of border loops on {loops} of {len(sheets)} cases."
+    )
+
+
+_NOTES = {"Double cover, mesh": _right_covers, "Single layer": _right_sheets}
 
 
 def markdown_table(results: list[dict], columns: list[Column]) -> str:

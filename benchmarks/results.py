@@ -1,5 +1,6 @@
 """docs/results.md, or a page like it: what is measured, how, and what came out, for both samplings."""
 
+import os
 from pathlib import Path
 
 from core.io.atomic import atomic_path, writable_folder
@@ -10,7 +11,8 @@ from .peers import PEERS, SHORT
 from .plots import plot_cd
 from .repeatability import OURS
 from .report import markdown_tables
-from .run import FINE_FROM, TWICE_UP_TO, missing
+from .run import PEER_LIMIT, TWICE_UP_TO, missing
+from .starts import FINE_FROM, ways_to_start
 
 _THREE_DIGITS = 5e-4
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -25,9 +27,9 @@ Every case is a point cloud without normals sampled from a known mesh, whose lon
 defaults, the same for every case; nothing is chosen per shape:
 {settings}.
 **Lengths are in the scale of the case and times 1000**, unless they are in cells of the grid (a cell is about 0.008).
-The machine has 2 shared CPU cores and no GPU. Other work on it shows in every time: by the clock, ratios to a peer that
-ran on the same points right after have differed up to fivefold between runs, in CPU time mostly by less than a third,
-so only the latter are worth comparing, and only within a run. Version of our code and of what measures it: {code}.
+The machine has {cores} CPU cores; no GPU is used. Other work on it shows in every time, by the clock more than in CPU
+time: compare ratios alone, of the latter first, and only within a run.
+Version of our code and of what measures it: {code}.
 
 {cases}
 
@@ -53,11 +55,11 @@ so only the latter are worth comparing, and only within a run. Version of our co
   {timing}, and *CPU*: of all threads together, which feels other work on the machine less. *MB*: what the run adds to
   the memory of a process of its own (Poisson's two share one), libraries not included. Parameters
   of the peers come from a stated set and are **the best for each case, chosen with the truth at hand**, which favours
-  them; ours are the defaults. *Clean* are cases without noise, strays, holes or wires. *Finer grid*: the
-  same with twice the cells, on cases of {fine:,} points or more, whose points are closer together than the default's
-  cells; the paper, too, takes 256 cells there. Scale-space
-  reconstruction is not in CGAL's Python package and so is missing; [the field](field.md) is measured beside the
-  distance to the nearest sample and to PCA's tangent planes. Poisson closes open surfaces by design, and needs an
+  them: {starts}. Ours are the defaults. A peer that is not done with all of these after {limit:g} s is *too slow*.
+  *Clean* are cases without noise, strays, holes or wires. *Finer grid*: ours with twice the cells, on cases of {fine:,}
+  points or more, whose points are closer together than the default's cells; the paper, too, takes 256 cells there.
+  Scale-space reconstruction is not in CGAL's Python package and so is missing; [the field](field.md) is measured beside
+  the distance to the nearest sample and to PCA's tangent planes. Poisson closes open surfaces by design, and needs an
   orientation, which non-orientable and non-manifold shapes do not have: read it as what the common route gives on the
   same points.
 
@@ -98,6 +100,9 @@ def write_results(runs: dict[str, dict], name: str = "results") -> Path:
         delaunay=_DELAUNAY if first["field"] else "",
         timing=_timing(first),
         fine=FINE_FROM,
+        limit=PEER_LIMIT,
+        starts=ways_to_start(),
+        cores=os.cpu_count(),
         ways=ways(),
     )
     for sampling, run in runs.items():
@@ -178,7 +183,7 @@ def _case_table(runs):
     by_name = [{result["case"]: result for result in run["cases"] if "error" not in result} for run in runs.values()]
     names = dict.fromkeys(name for results in by_name for name in results)
     lines = [
-        f"| case | kind | {' | '.join(f'points, {s}' for s in runs)} | surface |",
+        f"| case | kind | {' | '.join(f'points, {s}' for s in runs)} | licence of the surface |",
         f"|---|---|{'---:|' * len(runs)}---|",
     ]
     for name in names:

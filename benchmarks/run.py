@@ -24,9 +24,9 @@ from .metrics import cover_euler, normal_agreement, surface_errors, topology
 from .peers import PEERS, delaunay_seconds, median_clock, timed
 from .processes import Failed, TooSlow, one_thread_each, run_fresh, run_warm
 from .repeatability import differences
+from .starts import FINE_FROM
 
-PEER_LIMIT = 400.0  # seconds, all variants together
-FINE_FROM = 100_000  # points of a case from which our double cover is measured on a grid twice as fine, too
+PEER_LIMIT = 400.0  # seconds, all ways to start and all variants together
 TWICE_UP_TO = 3_000  # points of a case that is measured twice where times are repeated
 _MISSING, _TOO_SLOW = "not measured", "too slow"
 
@@ -70,7 +70,7 @@ def time_cases(paths: list[Path], sampling: str, plan: Plan) -> Iterator[tuple[s
         if FEWEST <= count_points(path, sampling) <= MOST:
             parts, given = _Parts(path, sampling, plan, Event()), (path, sampling, plan.settings, plan.repeats)
             try:
-                yield path.stem, parts.measure("alone", kept.OURS, partial(run_fresh, time_alone, *given))
+                yield path.stem, parts.measure("alone", kept.ALONE, partial(run_fresh, time_alone, *given))
             except Failed as error:
                 yield path.stem, {"error": str(error)}
             except TimeoutError:
@@ -103,7 +103,8 @@ class _Parts:
             return in_time()
         file = self.plan.keep / self.sampling.replace(" ", "_") / f"{self.path.stem}.{name}.json"
         made_of = (
-            f"{self.plan.settings} {self.plan.repeats} {self.plan.field} {sha256(self.path.read_bytes()).hexdigest()}"
+            f"{self.plan.settings} {self.plan.repeats} {self.plan.field} {self.plan.jobs} {PEER_LIMIT} "
+            f"{sha256(self.path.read_bytes()).hexdigest()}"
         )
         return kept.once(file, sources, made_of, in_time)
 
@@ -118,7 +119,7 @@ class _Parts:
     def _peers(self, suffix):
         """What :func:`measure_peers` finds of all that are installed, by name; one that fails has only `error`.
         Where one is too slow, those with the same first step are taken to be so, too."""
-        groups, measured, too_slow = {}, {}, {}
+        groups, measured, too_slow = {}, {}, set()
         for name, peer in PEERS.items():
             if peer.available:
                 groups.setdefault(peer.prepare, []).append(name)
@@ -128,15 +129,16 @@ class _Parts:
             first_step = PEERS[names[0]].first_step
             try:
                 if first_step in too_slow:
-                    raise too_slow[first_step]
+                    raise TooSlow(f"not begun: {first_step} takes too long")
                 found = self.measure(f"{'+'.join(names)}{suffix}", kept.PEERS, run)
                 if _TOO_SLOW in found:
                     raise TooSlow(found[_TOO_SLOW])
                 measured |= found
             except Failed as error:
-                measured |= {name: {"error": str(error)} for name in names}
-                if isinstance(error, TooSlow) and first_step:
-                    too_slow[first_step] = error
+                slow = isinstance(error, TooSlow)
+                measured |= {name: {"error": str(error), "too_slow": slow} for name in names}
+                if slow and first_step:
+                    too_slow.add(first_step)
         return measured
 
 

@@ -1,10 +1,8 @@
 """docs/scale.md: `python -m benchmarks.scale FOLDER` measures how cost grows with the grid and with the points, and how
 surfaces come closer on finer grids."""
 
-import platform
 import sys
 from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +16,11 @@ from core.memory import peak_memory_mb
 from . import detail
 from .cases import find_cases, load_case
 from .geometry import surface_points
-from .peers import Clock, check_open3d, poisson
+from .peers import Clock, check_open3d, load_open3d, poisson
 from .processes import run_fresh
 from .status import page_command
 from .tables import markdown_rows
+from .versions import listed, versions
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
@@ -96,7 +95,7 @@ def measure(folder: Path) -> dict:
     check_open3d()
     (path,), cases = find_cases(folder, [SHAPE]), find_cases(folder, detail.CASES)
     return {
-        "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+        "versions": versions(_LIBRARIES),
         "runs": list(_said(run_cost, path, RUNS)),
         "open3d": list(_said(open3d_cost, path, [(count,) for count in COUNTS])),
         "detail": [row for case in cases for row in _said(detail.detail, case, [(apart,) for apart in detail.APART])],
@@ -148,6 +147,7 @@ class _Watch:
 def open3d_cost(path: Path, count: int) -> dict:
     """The same for Open3D's normals, orientation and Poisson surface."""
     points = surface_points(load_case(path).truth, count, np.random.default_rng(0))
+    load_open3d()
     before = peak_memory_mb()
     _, _, clock = poisson(points)
     return {
@@ -165,7 +165,7 @@ def write_page(measured: dict, docs: Path) -> Path:
     coarse, fine = (_run(measured, POINTS, grid, 4, "double") for grid in GRIDS)
     few, many = (_run(measured, count, GRIDS[0], 4, "double") for count in (COUNTS[0], COUNTS[-1]))
     text = _PAGE.format(
-        versions=", ".join(f"{name} {number}" for name, number in measured["versions"].items()),
+        versions=listed(measured["versions"]),
         shape=SHAPE,
         verdicts="\n".join(f"- {line}" for line in verdicts(measured)),
         runs=_runs(measured),

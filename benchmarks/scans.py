@@ -1,10 +1,8 @@
 """docs/scans.md: `python -m benchmarks.scans` reconstructs what scanners make of known shapes, and writes the page."""
 
 import argparse
-import platform
 import sys
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +20,7 @@ from .pictures import View, caption, draw_points, draw_surface, save, sheet
 from .scanners import IMAGES, JUMP, SHARE, before_camera, depth_frame, depth_images, in_room, seen_from_one_spot
 from .shapes import rooms
 from .status import DONE, exit_status, said
+from .versions import listed, versions
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPES = ("bumps_10k", "box_10k", "tangle_10k", "knot_10k", "candy_10k", "hemisphere_2k", "cloth_10k", "mask_5k")
@@ -101,7 +100,7 @@ def measure() -> dict:
     check_open3d()
     scans = [(count, noise) for count in ROOM_POINTS for noise in ROOM_NOISE]
     return {
-        "versions": {"Python": platform.python_version(), **{name: version(name) for name in _LIBRARIES}},
+        "versions": versions(_LIBRARIES),
         "images": [said(name, measure_images(name)) for name in SHAPES],
         "rooms": [said(f"room, {count:,} points, {noise:g} %", measure_room(count, noise)) for count, noise in scans],
         "frames": [said(f"frame, steps of {step:g}, {noise:g}", measure_frame(step, noise)) for step, noise in FRAMES],
@@ -176,7 +175,7 @@ def write_page(measured: dict, docs: Path) -> Path:
     write_report(writable_folder(docs / "scans") / "numbers.json", measured)
     page = docs / "scans.md"
     text = _PAGE.format(
-        versions=", ".join(f"{name} {number}" for name, number in measured["versions"].items()),
+        versions=listed(measured["versions"]),
         images=IMAGES,
         points=POINTS,
         jump=JUMP,

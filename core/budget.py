@@ -93,12 +93,17 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     if estimate.memory_mb <= limit:
         return (f"estimated at {estimate.memory_mb:.0f} MiB, of {limit:.0f} MiB that may be used",)
     area = float(np.sum((spacing / grid.spacing) ** 2))
-    coarser = range(settings.resolution - 1, settings.coarsest - 1, -1)
-    if resolution := next((r for r in coarser if _memory_at(r, len(spacing), area, grid, settings) <= limit), None):
+    resolutions, fitting = range(settings.resolution, settings.coarsest - 1, -1), _fitting_samples(limit, settings)
+
+    def finest(samples):
+        return next((r for r in resolutions if _memory_at(r, samples, area, grid, settings) <= limit), None)
+
+    if resolution := finest(len(spacing)):
         band = _fitting_band(len(spacing), area, limit, settings)
         remedy = f"use resolution {resolution} or less{band}, or raise memory_limit"
-    elif len(spacing) > (fitting := _fitting_samples(limit, settings)) >= MINIMUM_SAMPLES:
-        remedy = f"thin the {len(spacing)} points to {fitting} or fewer, or raise memory_limit"
+    elif len(spacing) > fitting >= MINIMUM_SAMPLES and (resolution := finest(fitting)):
+        coarser = "" if resolution == settings.resolution else f" and use resolution {resolution} or less"
+        remedy = f"thin the {len(spacing)} points to {fitting} or fewer{coarser}, or raise memory_limit"
     elif _memory_at(options()["resolution"].metadata["limits"][0], len(spacing), area, grid, settings) <= limit:
         remedy = "lower the offset, which a coarser grid has no room for, or raise memory_limit"
     else:

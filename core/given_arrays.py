@@ -43,5 +43,7 @@ def spacing_of(points: np.ndarray, given) -> np.ndarray:
     if spacing.shape != (len(points),):
         raise InputError(f"local spacings have shape {spacing.shape}; give one for each of the {len(points)} points")
     if not ((spacing > 0) & (spacing < np.inf)).all():
-        raise InputError("some local spacings are not above 0 and finite; give what local_spacing(points) does")
+        raise InputError(
+            "some local spacings are not above 0 and finite; give what local_spacing(points) does, no point twice"
+        )
     return spacing

@@ -27,7 +27,7 @@ _CHUNK = 16384  # points
 
 def find_near_duplicates(points: np.ndarray, progress=None) -> np.ndarray:
     """(n,) bool: which of distinct points (n,3) float64 are copies of earlier ones, at most a fifth of the local
-    spacing away; none where close points are no more than chance leaves.
+    spacing away, or of copies of such; none where close points are no more than chance leaves.
 
     The local spacing here is the side of the square that each of a point's 16 nearest has to itself.
     """

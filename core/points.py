@@ -17,7 +17,7 @@ _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
 _CHUNK = 16384  # samples
 _ROUNDED, _ODD = 0.02, 0.25  # steps of coordinates, local spacings, that are told; share of odd numbers of these steps
-_FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
+_FLATNESS = 1e-6  # relative to the longest side; what is thinner counts as a line, as one in single precision does
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _framed(given, source_index, warnings):
             "so scale them to an ordinary size"
         )
     centre = low + (high - low) / 2
-    points = np.rint((given - centre) / (scale * _QUANTUM)) * _QUANTUM
+    points = np.rint((given - low - (high - low) / 2) / (scale * _QUANTUM)) * _QUANTUM  # the centre is rounded
     distinct = first_of_each(points, np.arange(len(points)))
     if len(distinct) < len(points):
         warnings = (

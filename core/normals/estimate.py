@@ -37,9 +37,10 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     (`random_axes`), from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and
     .975 instead of .970, .989 and .9999.
 
-    Raises :class:`InputError` for fewer than 4 points, points that are not finite, spacings that are none, and
-    constraints as :func:`checked_constraints` does, :class:`MissingDependency` where torch or a GPU is asked for and
-    missing, :class:`SettingsError` where NumPy is asked for on a GPU.
+    Raises :class:`InputError` for fewer than 4 points, points that are not finite or occur twice (but the plain plane
+    fit takes such), spacings that are none, and constraints as :func:`checked_constraints` does,
+    :class:`MissingDependency` where torch or a GPU is asked for and missing, :class:`SettingsError` where NumPy is to
+    use a GPU.
     """
     progress, points = Progress.of(progress), finite_points(points, least=MINIMUM_SAMPLES)
     spacing = spacing_of(points, spacing)

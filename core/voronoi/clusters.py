@@ -2,6 +2,8 @@
 
 import numpy as np
 
+_EQUAL = 1e-10  # of their mean, by which equal distances differ
+
 
 def near_cluster(site: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """Exact 1-D 2-means of each sample's neighbour distances (section 4.2 of the paper).
@@ -20,7 +22,8 @@ def near_cluster(site: np.ndarray, distance: np.ndarray) -> np.ndarray:
     size = np.diff(begins, append=len(owner))
     group = np.repeat(np.arange(len(begins)), size)
 
-    value = value - (np.add.reduceat(value, begins) / size)[group]
+    mean = np.add.reduceat(value, begins) / size
+    value = value - mean[group]
     k = np.arange(len(owner)) - begins[group] + 1
     running = np.cumsum(value)
     running -= (running[begins] - value[begins])[group]
@@ -29,5 +32,6 @@ def near_cluster(site: np.ndarray, distance: np.ndarray) -> np.ndarray:
     # S_m is zero about the mean
     best = np.lexsort((k, -gain, group))[begins]
     near = np.empty(len(site), bool)
-    near[order] = (k <= k[best][group]) | (np.maximum.reduceat(gain, begins) == 0)[group]
+    equal = np.maximum.reduceat(gain, begins) <= size * (_EQUAL * mean) ** 2
+    near[order] = (k <= k[best][group]) | equal[group]
     return near

@@ -33,6 +33,7 @@ HEEDED = 2 * math.hypot(CLIP_RADIUS, REACH / 2)  # local spacings, radius of the
 
 _NEGLIGIBLE = 1e-9  # squared clip radii
 _JITTER = 1e-6  # local spacings
+_FINER, _STIRRED = 0.02, 1e-3  # times the spacing of a block's own; local spacings, jitter of others that much finer
 _FARTHEST = 1e6  # half boxes, to which circumcentres of flat tetrahedra are brought in
 _CORNER_DISTANCE = 5.0  # half boxes; from 3 on the tetrahedron holds the box
 
@@ -82,7 +83,8 @@ def voronoi_facets(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progr
     spacing : (n,) float64, local spacing of each sample, units of `points`
 
     Departures from the paper: sites are jittered by 1e-6 spacings, because Qhull is quadratic on cospherical and
-    coplanar input; facets are clipped, because far from the surface they say nothing about it, and the few that run
+    coplanar input, and by 1e-3 those that a block of far sparser samples heeds, beside whose extent the former is lost
+    in rounding; facets are clipped, because far from the surface they say nothing about it, and the few that run
     out to the box would outweigh all others; and facets between samples far apart, on either side of a hollow, are
     left out, which makes the diagram local and changes mean |n.n_true| by less than 1e-4 (noise: 2e-4).
 
@@ -120,20 +122,24 @@ def by_blocks(
     progress = Progress.of(progress)
     jitter = np.random.default_rng(seed).uniform(-1, 1, points.shape) * (_JITTER * spacing)[:, None]
     sites, radius = points + jitter, HEEDED * spacing
+    stir = jitter * (_STIRRED / _JITTER)
     blocks, done = overlapping_blocks(sites, radius, progress.part(0.0, 0.1)), 0
     blocks.sort(key=lambda block: -len(block.members))  # the largest would be worked on alone if it came last
-    for block, made in in_order(lambda block: make(_sides(sites, spacing, radius, block)), blocks):
+    for block, made in in_order(lambda block: make(_sides(sites, stir, spacing, radius, block)), blocks):
         yield made
         done += len(block.own)
         progress(0.1 + 0.9 * done / len(points))
 
 
-def _sides(sites, spacing, radius, block):
+def _sides(sites, stir, spacing, radius, block):
     """Sides of the facets whose pair's sample with the larger spacing, or the first of equals, is the block's own."""
-    members, count = block.members, len(block.members)
+    members = _heeded(sites, spacing, block)
+    count = len(members)
     spacing, own = spacing[members], np.isin(members, block.own, assume_unique=True)
     beyond = radius[block.own].max() if count < len(sites) else 0.0  # the outermost of all have nothing to heed there
-    sites = sites[members] - sites[members].mean(axis=0)  # a frame of their own, which takes no digits from distances
+    finer = ~own & (spacing < _FINER * np.median(spacing[own]))
+    sites = sites[members] + np.where(finer[:, None], stir[members], 0.0)
+    sites -= sites.mean(axis=0)  # a frame of their own, which takes no digits from distances
     sites = np.concatenate([sites, _corners(sites, beyond)])
     delaunay = _tetrahedra(sites)
 
@@ -167,6 +173,19 @@ def _sides(sites, spacing, radius, block):
         axis=step / length[:, None],
         radius=clip_radius(spacing, i, j),
     )
+
+
+def _heeded(sites, spacing, block):
+    """The members of a block, of those that are far finer than its own one in each cell of a grid as fine."""
+    own = np.isin(block.members, block.own, assume_unique=True)
+    size = _FINER * np.median(spacing[block.own])
+    finer = np.flatnonzero(~own & (spacing[block.members] < size))
+    kept = np.ones(len(own), bool)
+    if len(finer):
+        cell = np.floor(sites[block.members[finer]] / size).astype(np.int64)
+        kept[finer] = False
+        kept[finer[np.unique(cell, axis=0, return_index=True)[1]]] = True
+    return block.members[kept]
 
 
 def _tetrahedra(sites):

@@ -13,6 +13,7 @@ from benchmarks.alone import time_alone
 from benchmarks.measure_peers import measure_peers
 from benchmarks.peers import PEERS, check_open3d, peer_libraries
 from benchmarks.plots import plot_cd
+from benchmarks.starts import USUAL, Start, readied, starts
 from core import Mesh, MissingDependency, Settings
 
 
@@ -38,7 +39,10 @@ def test_verdicts_follow_the_numbers():
     assert lines[0].startswith("**Met**: VAD, double cover: the lowest CD on 9 of 10 clean cases (90%;")
     assert "at worst 1.20 × the best peer's, on edge" in lines[0]
     assert lines[1].startswith("VAD, single layer: the lowest CD on 10 of 10")
-    assert lines[2:] == ["Lost: edge: CD 1.200, single layer 0.900, Poisson 1.000."]
+    assert lines[2].startswith(
+        "VAD, double cover, of these 10 by the other measures: the lowest HD on 9, the highest NC"
+    )
+    assert lines[3:] == ["Lost: edge: CD 1.200, single layer 0.900, Poisson 1.000."]
     assert next(verdicts([*good, result("bad", 1.4, 1.4, poisson=1.0)])).startswith("**Missed**")
     assert next(verdicts([good[0], result("few", 1.1, 1.1, poisson=1.0)])).startswith("**Missed**")
 
@@ -59,7 +63,27 @@ def test_a_finer_grid_counts_where_it_was_measured():
 def test_spoiled_cases_count_for_nothing_but_are_shown():
     lines = list(verdicts([result("a", 1.0, 1.0, poisson=2.0), result("n", 3.0, 2.0, "noisy", alpha=1.0)]))
     assert "1 of 1 clean cases" in lines[0]
-    assert lines[2] == "Lost: n, noisy: CD 3.000, single layer 2.000, alpha shape 1.000."
+    assert lines[3] == "Lost: n, noisy: CD 3.000, single layer 2.000, alpha shape 1.000."
+
+
+def test_other_measures_count_against_every_peer():
+    ours, theirs = {"nc": 0.9, "f005": 0.8, "f010": 1.0}, {"nc": 0.95, "f005": 0.7, "f010": 1.0}
+    case = result("a", 1.0, 1.0, poisson=2.0, front=3.0)
+    case["mesh"] |= ours
+    case["peers"]["front"] |= theirs
+    said = next(line for line in verdicts([case]) if "other measures" in line)
+    assert said.endswith("the lowest HD on 1, the highest NC on 0, the highest F@.005 on 1, the highest F@.010 on 1.")
+
+
+def test_a_case_that_no_peer_ended_is_shown_and_not_counted():
+    room = result("room", 1.0, 1.0, poisson="not done after 400 s")
+    room["peers"]["poisson"]["too_slow"] = True
+    results = [result("a", 1.0, 1.0, poisson=2.0), room]
+    lines = list(verdicts(results))
+    assert "1 of 1 clean cases" in lines[0]
+    assert lines[-1] == "Not counted, as no peer came to an end there: room."
+    assert "| room | **1.000** | **1.000** | too slow | – |" in overview(results)
+    assert "| room | Poisson | not done after 400 s |" in full_table(results)
 
 
 def test_tables_show_the_lowest_and_what_failed():
@@ -117,19 +141,49 @@ def test_a_peer_meshes_a_sphere(name, ball):
     assert found["cd"] < 5
     assert found["nc"] > 0.95
     assert found["seconds"] > 0
-    assert found["variant"] in PEERS[name].variants
+    ways = starts("watertight", 800, PEERS[name].normals, PEERS[name].octree)
+    texts = [str(variant).strip("()[]") for variant in PEERS[name].variants if variant is not None] or [""]
+    known = {"; ".join(filter(None, (str(start), text))) or None for start in ways for text in texts}
+    assert found["variant"] in known
+
+
+def test_peers_may_start_in_several_ways():
+    assert starts("watertight", 1_000, False, False) == [Start()]
+    assert [start.neighbours for start in starts("open", 10_000, True, False)] == [30, 12, 8]
+    assert starts("open", 100_000, True, True) == [USUAL, Start(neighbours=30, depth=9)]
+    assert [start.cleaning for start in starts("outliers", 50_000, True, False)] == [None, "strays dropped"]
+    assert [str(start) for start in starts("noisy", 10_000, False, False)] == ["", "smoothed"]
+    assert str(Start(neighbours=12, depth=9)) == "12 neighbours, depth 9"
+
+
+def test_points_are_cleaned_before_peers_start():
+    ball = np.random.default_rng(0).normal(size=(2_000, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    pytest.importorskip("open3d", exc_type=ImportError)
+    kept = readied(np.concatenate([ball, [[3.0, 0, 0]]]), Start("strays dropped"))
+    assert 1_800 < len(kept) <= 2_000
+    assert np.linalg.norm(kept, axis=1).max() < 1.1
+    pytest.importorskip("CGAL")
+    rough = ball * np.random.default_rng(1).normal(1, 0.02, (2_000, 1))
+    smooth = readied(rough, Start("smoothed"))
+    assert np.abs(np.linalg.norm(smooth, axis=1) - 1).mean() < 0.5 * np.abs(np.linalg.norm(rough, axis=1) - 1).mean()
 
 
 def test_one_peers_failure_leaves_the_others(ball, monkeypatch):
     def broken(_, variant):
         raise RuntimeError("no")
 
+    def fickle(points, variant):
+        return broken(points, variant) if variant else _pyramid(points)
+
     whole = PEERS["front"]
     made = {"a": whole, "b": replace(whole, finish=broken), "c": replace(whole, finish=lambda *_: Mesh(*_EMPTY))}
-    working = replace(whole, prepare=lambda points: points, finish=lambda points, _: _pyramid(points))
-    monkeypatch.setattr("benchmarks.measure_peers.PEERS", made | {"a": working})
-    found = measure_peers(["a", "b", "c"], ball, "uniform", 1)
+    working = replace(whole, finish=lambda points, _: _pyramid(points))
+    made |= {"a": working, "d": replace(whole, finish=fickle, variants=(1, 0))}
+    monkeypatch.setattr("benchmarks.measure_peers.PEERS", made)
+    found = measure_peers(["a", "b", "c", "d"], ball, "uniform", 1)
     assert found["a"]["cd"] > 1
+    assert (found["d"]["cd"], found["d"]["variant"]) == (found["a"]["cd"], "0")
     assert found["b"] == {"error": "RuntimeError: no"}
     assert found["c"] == {"error": "ValueError: it made no triangle"}
 

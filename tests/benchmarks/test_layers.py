@@ -51,11 +51,11 @@ def test_a_double_cover_is_compared_with_faces_astride(tmp_path):
 
 
 def test_the_page_shows_every_row(tmp_path):
-    row = {"case": "ball", "sampling": "uniform", "crossed": 0.05, "gap": [0.0] * len(PERCENTILES)}
+    row = {"case": "ball", "sampling": "uniform", "paired": 0.9, "crossed": 0.05, "gap": [0.0] * len(PERCENTILES)}
     row |= {"crossed_astride": 0.5, "cd": 0.2, "cd_astride": 0.1}
     sides = row | {"case": "sheet", "crossed_astride": None, "cd_astride": None}
     page = write_page([row, sides], tmp_path).read_text()
-    assert "| ball | uniform | 5.00% |" in page
+    assert "| ball | uniform | 90.0% | 5.00% |" in page
     assert "| 50.0% | 0.200 | 0.100 | 2.00 |" in page
     assert "| – | 0.200 | – | – |" in page
     assert json.loads((tmp_path / "layers" / "numbers.json").read_text())["rows"] == [row, sides]

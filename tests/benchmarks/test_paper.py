@@ -37,13 +37,13 @@ def test_runs_stand_beside_what_they_are_like(tmp_path):
         (tmp_path / page / f"{sampling}.json").write_text(json.dumps({"cases": cases}))
     lines = write_page(tmp_path).read_text().splitlines()
     cloth = "| Cloth (10k) | 0.172 / 10.8 | 0.162 / 8.8 |"
-    assert f"{cloth} cloth_10k, measured | 0.500 / 12.0 | – |" in lines
+    assert f"{cloth} cloth_10k, for development | 0.500 / 12.0 | – |" in lines
     assert "|  |  |  | cloth_10k, made by script | 0.250 / 12.0 | 0.125 / 12.0 |" in lines
     assert "| Knot (1k) | 0.468 / 8.0 | 0.812 / 7.4 | knot_1k, made by script | 0.750 / 12.0 | – |" in lines
     assert "| Bears | 0.9909 | 0.9873 | – | – | – |" in lines
     clothes = next(line for line in lines if line.startswith("| clothes"))
     assert "| 0.375 |" in clothes  # mean of both
-    assert clothes.endswith("| measured: cloth_10k; made by script: cloth_10k |")
+    assert clothes.endswith("| for development: cloth_10k; made by script: cloth_10k |")
 
 
 def test_without_runs_there_is_no_page(tmp_path):

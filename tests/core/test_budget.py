@@ -183,6 +183,17 @@ def test_the_advice_to_thin_fits_on_any_number_of_cores(monkeypatch, processors)
     assert estimate_cost(np.full(fitting, 1e-4), grid, settings).memory_mb == pytest.approx(300, abs=1)
 
 
+def test_points_to_thin_and_a_resolution_that_fit_together():
+    spacing, grid = cost(POINTS, 512)[1].spacing * np.full(40_000, 2.0), cost(POINTS, 512)[1]
+    settings = Settings(resolution=512, memory_limit=90)
+    with pytest.raises(MemoryBudgetError) as caught:
+        check_budget(estimate_cost(spacing, grid, settings), spacing, grid, settings)
+    words = str(caught.value).split()
+    count, resolution = int(words[words.index("to") + 1]), int(words[words.index("resolution", 3) + 1])
+    fewer, coarser = spacing[:count] * np.sqrt(40_000 / count), fit_grid(POINTS, resolution)
+    assert estimate_cost(fewer, coarser, replace(settings, resolution=resolution)).memory_mb <= 90
+
+
 def test_no_points_are_advised_that_are_too_few():
     _, grid = cost(POINTS, 16)
     with pytest.raises(MemoryBudgetError, match=r"may be used; raise memory_limit$"):

@@ -91,6 +91,8 @@ def test_an_exact_shift_changes_no_bit(random):
     assert here.points.tobytes() == there.points.tobytes()
     assert here.scale == there.scale
     np.testing.assert_array_equal(there.centre, here.centre + 1e6)
+    points = 1e6 + random.random((200, 3))
+    assert prepare_samples(points).points.tobytes() == prepare_samples(points - 1e6).points.tobytes()
 
 
 @pytest.mark.parametrize("factor", [2.0**-60, 2.0**60])
@@ -119,6 +121,7 @@ def test_a_plane_is_fine():
         (np.array(TETRAHEDRON) * 1j, "complex"),
         ([[10**400, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "real numbers"),
         (np.arange(30.0)[:, None] * [1, 2, 3], "30 distinct points lie on one line"),
+        ((np.linspace(0, 1, 500)[:, None] * [1, 2, 3]).astype(np.float32), "500 distinct points lie on one line"),
         ([[-1e308, 0, 0], [1e308, 0, 0], [0, 1, 0], [0, 0, 1]], "inf.*scale them"),
         (np.array(TETRAHEDRON) * 1e-310, "1e-310.*scale them"),
     ],

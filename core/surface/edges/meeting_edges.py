@@ -60,7 +60,7 @@ def meeting_edges(
     found = [found for _, found in in_order(lambda axis: _along(axis, ahead[axis], sheets, x, cell, hair), range(3))]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
     one, place, normal, crossed, certainty, beyond, near = (np.concatenate(part) for part in zip(*found, strict=True))
-    kept = _reaches(place, normal, beyond, sheets, near, surface, len(row), cell)
+    kept = _reaches(place, normal, beyond, sheets, near, surface, len(row), cell, hair)
     edge = 3 * row[one[kept]] + axis[kept]
     zone = np.concatenate([3 * row[ahead[a] >= 0] + a for a in range(3)])
     return MeetingEdges(edge, place[kept], normal[kept], crossed[kept], certainty[kept], zone)
@@ -102,9 +102,9 @@ def _least(key, cost):
     return chosen
 
 
-def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell):
+def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell, hair):
     """Whether the sheet of each candidate gets there: within its rim and not past another sheet at which it ends, or
-    in the gap between its last samples and such a sheet."""
+    in the gap between its last samples and such a sheet; on which side of that, `hair` decides as for nodes."""
     first, count = sheets.span(nodes)
     covered, cut = beyond <= _COVERED * cell, np.zeros(len(place), bool)
     for i in range(count.max(initial=0)):
@@ -114,7 +114,7 @@ def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell):
         row = row[np.abs(row_dots(sheets.axis[other[row]], normal[row])) < _ACROSS]
         own, other = near[row], other[row]
         axis, foot = sheets.axis[other], sheets.foot[other]
-        height = row_dots(place[row] - foot, axis)
+        height = row_dots(place[row] - foot + hair, axis)
         up = np.where(height < 0, -1.0, 1.0)
         heights = np.einsum("eki,ei->ek", surface.points[sheets.sample[own]] - foot[:, None], axis) * up[:, None]
         member = sheets.member[own]

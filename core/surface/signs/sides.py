@@ -260,6 +260,8 @@ def _without_specks(inside, beside, surface, grid):
         size = counts(part)
         small = size < _SPECK
         small[0] = False
+        if not small.any():
+            continue
         node = marked_nodes(each(lambda name: small[name], part))  # noqa: B023
         between = beside[surface.tree.query(grid.positions(node), workers=-1)[1]]
         held = np.unique(at_nodes(part, node[between]))

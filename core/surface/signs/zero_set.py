@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...field.blocks import Blocks, at_nodes
+from ...field.blocks import Blocks, at_nodes, each
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...progress import Progress
@@ -20,10 +20,11 @@ def zero_set(
     within: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (v,3) and quads or triangles (f,4) or (f,3) of the zero set of signed distances (nx,ny,nz) float32 or
-    Blocks, which may be changed: at thin parts, which the signs of nodes do not show, they start off the surface and
+    Blocks: at thin parts, which the signs of nodes do not show, they start off the surface and
     are pulled in, as those of a double cover. Only where the nodes nearest to the vertices are `within` that distance:
     where distances end, there is no surface."""
     if thin:
+        values = each(np.copy, values)
         thin.lower(values, grid)
     cells, faces = isosurface(values, 0.0)
     vertices = grid.origin + grid.spacing * cells

@@ -78,7 +78,18 @@ def _filled(mesh, borders, loops, paths, surface, cell):
     closed &= _covered(mesh, triangle, loop, len(loops), cell) < _DOUBLED
     if not closed.any():
         return mesh
-    return replace(mesh, faces=np.concatenate([mesh.faces, triangle[closed[loop]]]).astype(np.int32))
+    triangle = _wound(triangle, loop, loops, mesh)[closed[loop]]
+    return replace(mesh, faces=np.concatenate([mesh.faces, triangle]).astype(np.int32))
+
+
+def _wound(triangle, loop, loops, mesh):
+    """Triangles that fill loops, by the number of each, wound as most faces beside it are. They follow the loop's own
+    direction, in which those have few of their edges."""
+    key = (len(mesh.vertices), 1)
+    rims = np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in loops]).astype(np.int64)
+    along = np.isin(rims @ key, _sides(mesh.faces)[0].astype(np.int64) @ key)
+    share = np.bincount(np.repeat(np.arange(len(loops)), [len(rim) for rim in loops]), along - 0.5)
+    return np.where(share[loop, None] > 0, triangle[:, [0, 2, 1]], triangle)
 
 
 def _reach(vertices, triangle, loop, loops, surface):

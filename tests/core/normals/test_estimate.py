@@ -33,6 +33,21 @@ def test_every_solver_finds_a_sphere_and_holds_constraints(solver):
     assert normals[held].tobytes() == given.tobytes()
 
 
+def test_a_dense_ball_beside_sparse_points_has_its_own_normals():
+    """Facets between it and those are as large as theirs."""
+    plane, ball = shapes.square(400), shapes.scattered_sphere(300, 1)
+    points = np.concatenate([plane, 0.001 * ball + [0.02, 0.03, 0.0012]])
+    normals, confidence, _ = estimate_normals(points, local_spacing(points))
+    assert degrees(normals[400:], ball).max() < 5
+    assert np.median(confidence[400:]) > 0.99
+
+
+def test_a_point_that_occurs_twice_is_refused():
+    points = np.concatenate([POINTS, POINTS[:1]])
+    with pytest.raises(InputError, match="occur twice"):
+        estimate_normals(points, local_spacing(points))
+
+
 def test_energy_solver_goes_through_the_whole_method():
     result = reconstruct(POINTS, NUMPY)
     report = result.report["normals"]

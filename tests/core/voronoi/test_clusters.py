@@ -38,3 +38,4 @@ def test_two_rings_of_neighbours_are_told_apart():
 
 def test_a_single_neighbour_and_equal_distances_are_kept():
     assert near_cluster(np.array([4, 7, 7, 7]), np.array([3.0, 2.0, 2.0, 2.0])).all()
+    assert near_cluster(np.full(6, 7), 0.1 * (1 + 1e-14 * np.arange(6))).all()

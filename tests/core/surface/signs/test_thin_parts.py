@@ -9,8 +9,10 @@ from core import Settings, reconstruct
 from core.field.grid import fit_grid
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
+from core.progress import Progress
 from core.surface.meshing.misfit import distances
 from core.surface.signs.thin_parts import ThinParts, find_thin_parts
+from core.surface.signs.zero_set import zero_set
 from tests import shapes
 
 NONE, NOWHERE = np.empty((0, 3)), np.zeros(1000, bool)
@@ -79,6 +81,15 @@ def test_values_are_lowered_near_the_surface_alone(ball):
     np.testing.assert_array_equal(lifted[~near], given[~near])
     at = grid.positions(np.flatnonzero(near))
     np.testing.assert_allclose(lifted[near], given[near] - parts.lift(at), atol=1e-6)
+
+
+def test_the_zero_set_at_thin_parts_leaves_distances_as_they_are(ball):
+    surface, grid, values = ball
+    given = np.abs(values)
+    parts, kept = find_thin_parts(given, NOWHERE, surface, grid), given.copy()
+    vertices, _ = zero_set(given, parts, surface, grid, Progress())
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, atol=0.1 * grid.spacing)
+    assert given.tobytes() == kept.tobytes()
 
 
 def test_samples_close_to_lines_count_as_that_alone(ball):

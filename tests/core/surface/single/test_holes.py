@@ -58,6 +58,14 @@ def test_pinholes_on_the_surface_close_and_the_rim_stays(plane, holes):
     np.testing.assert_allclose(mesh.vertices[:, 2], 0, atol=1e-9)
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_fillings_are_wound_as_the_faces_around(plane, turn):
+    mesh = lattice(block(1) | block(3, 20))
+    mesh = fill_pinholes(Mesh(mesh.vertices, mesh.faces[:, ::turn]), plane, CELL)
+    assert mesh.border_loops() == 1
+    assert mesh.edges.alike.all()
+
+
 def test_a_loop_longer_than_64_edges_stays(plane):
     mesh = lattice(block(17, 5))
     assert fill_pinholes(mesh, plane, CELL).border_loops() == 2

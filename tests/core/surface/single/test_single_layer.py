@@ -210,6 +210,15 @@ def test_a_step_whose_middle_wall_lies_on_nodes_is_one_sheet(seed):
     assert shapes.euler(run.surface) == 2
 
 
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_a_wall_on_a_floor_that_lies_on_nodes_is_joined_to_it(seed):
+    floor = shapes.scattered_rectangles([((0, 0, 0), (1, 1, 0))], 450, seed)
+    wall = shapes.scattered_rectangles([((0, 0.5, 0), (1, 0.5, 0.5))], 450, seed + 1)
+    run = reconstruct(np.concatenate([floor, wall]), Settings(resolution=40, surface="both"))
+    assert len(shapes.components(run.sheet)) == len(shapes.components(run.surface)) == 1
+    assert 25 < (run.sheet.edges.count == 3).sum() < 45
+
+
 def hollow_box(wall):
     return np.concatenate([shapes.scattered_box(1800, [2, 2, 2]), shapes.scattered_box(1200, [2 - 2 * wall] * 3)])
 
