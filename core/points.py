@@ -17,7 +17,7 @@ _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
 _CHUNK = 16384  # samples
 _ROUNDED, _ODD = 0.02, 0.25  # steps of coordinates, local spacings, that are told; share of odd numbers of these steps
-_FLATNESS = 1e-6  # relative to the longest side; what is thinner counts as a line, as one in single precision does
+_FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
 
 @dataclass(frozen=True)

@@ -39,5 +39,5 @@ def test_claims_count_what_was_measured(tmp_path):
     assert (
         "\nWith noise, strays, holes or wires it has the lowest CD on 1 of 1 cases.\nNo count has room, where" in text
     )
-    assert "development cases" not in text
+    assert "[development cases]" not in text
     assert with_claims(f"a\n{START}old\n{END}\nb", text) == f"a\n{START}{text}{END}\nb"

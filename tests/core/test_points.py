@@ -121,7 +121,6 @@ def test_a_plane_is_fine():
         (np.array(TETRAHEDRON) * 1j, "complex"),
         ([[10**400, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "real numbers"),
         (np.arange(30.0)[:, None] * [1, 2, 3], "30 distinct points lie on one line"),
-        ((np.linspace(0, 1, 500)[:, None] * [1, 2, 3]).astype(np.float32), "500 distinct points lie on one line"),
         ([[-1e308, 0, 0], [1e308, 0, 0], [0, 1, 0], [0, 0, 1]], "inf.*scale them"),
         (np.array(TETRAHEDRON) * 1e-310, "1e-310.*scale them"),
     ],
