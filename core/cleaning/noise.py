@@ -49,22 +49,25 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     found = roughness(points, spacing, seed, progress)
     for suspect, part in _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.9)):
         if suspect.any():
-            level = np.median(found.relative[suspect])
-            suspect = suspect[found.region[:, :SMOOTHING]].any(axis=1)  # noise left beside would stand out as a seam
-            if not _seems_only(points, spacing, found.anchors[suspect], level, part):
+            level, beside = np.median(found.relative[suspect]), suspect[found.region[:, :SMOOTHING]]
+            amid = suspect & beside.all(axis=1)
+            amid = found.anchors[amid if amid.any() else suspect]
+            suspect = beside.any(axis=1)  # noise left beside would stand out as a seam
+            if not _seems_only(points, spacing, found.anchors[suspect], amid, level, part):
                 break
     else:
         return clean
     return suspect[nearest_anchor(points, points[found.anchors], progress.part(0.9, 1.0))]
 
 
-def _seems_only(points, spacing, anchors, level, progress):
+def _seems_only(points, spacing, anchors, amid, level, progress):
     """Whether samples that seem to have noise of `level` local spacings at some anchors are free of it: those of thin
-    walls, or on flat faces, and not of two scans that are shifted against each other."""
+    walls, or on flat faces, and not of two scans that are shifted against each other. Flat faces are asked for `amid`
+    these alone: beside noise a smooth surface looks flat."""
     sheets = two_sheets(points, spacing, anchors, level, progress)
     if sheets is not None:
         return not is_shift(*sheets)
-    return shows_flat_patches(points, spacing, anchors, level)
+    return shows_flat_patches(points, spacing, amid, level)
 
 
 def _noisy_anchors(points, spacing, found, seed, progress):

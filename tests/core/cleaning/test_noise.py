@@ -73,7 +73,13 @@ def test_waves_as_short_as_samples_can_show_are_detail():
 
 
 @pytest.mark.parametrize(
-    ("shape", "share"), [(shapes.scattered_sphere(2000), 0.3), (shapes.torus(2000), 0.8), (shapes.moebius(1500), 0.3)]
+    ("shape", "share"),
+    [
+        (shapes.scattered_sphere(2000), 0.3),
+        (shapes.torus(2000), 0.8),
+        (shapes.moebius(1500), 0.3),
+        (shapes.moebius(3000), 0.45),  # beside the noise its other half looks flat
+    ],
 )
 def test_noise_of_one_half_is_found_there(shape, share):
     points, half = shape.copy(), shape[:, 0] > 0
