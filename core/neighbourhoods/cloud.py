@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 
 from ..linalg import tangent_frames
 from ..progress import Progress
+from .lines import Lines, find_lines
 
 _NEIGHBOURS = 16  # of a sample, that its patch is fitted to
 _CHUNK = 16384  # samples
@@ -19,6 +20,7 @@ class Cloud:
     frames     : (n,2,3) float64, two unit tangents at each sample
     neighbours : (n,k) int, the samples that each one's patch is fitted to, nearest first
     tree       : of the points
+    lines      : those that samples are on
     """
 
     points: np.ndarray
@@ -27,6 +29,7 @@ class Cloud:
     frames: np.ndarray
     neighbours: np.ndarray
     tree: KDTree
+    lines: Lines
 
     @classmethod
     def of(cls, points, normals, spacing, progress=None) -> "Cloud":
@@ -36,7 +39,8 @@ class Cloud:
         neighbours = np.empty((tree.n, k - 1), np.int64)
         for part in Progress.of(progress).chunks(tree.n, _CHUNK):
             neighbours[part] = tree.query(tree.data[part], k=k, workers=-1)[1][:, 1:]
-        return cls(points, normals, spacing, tangent_frames(normals), neighbours, tree)
+        lines = find_lines(points, spacing, neighbours)
+        return cls(points, normals, spacing, tangent_frames(normals), neighbours, tree, lines)
 
     def turned(self, normals: np.ndarray) -> "Cloud":
         """The same with other normals (n,3)."""

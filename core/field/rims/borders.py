@@ -98,6 +98,7 @@ def _find_rims(part, cloud, bend, bridge):
     flat = one_sheet(step, own[:, None], theirs)
     larger = np.maximum(spacing[:, None], cloud.spacing[neighbours])
     same, laid, crease, limit = _laid_flat(step, own, theirs, spacing, larger, flat)
+    same &= ~_of_other_lines(part, step, larger, cloud.lines)
     place = np.einsum("nki,nai->nka", laid, frames)
     width, middle, bounding = _widest_angles(place, same)
     outward = np.einsum("na,nai->ni", np.stack([np.cos(middle), np.sin(middle)], axis=1), frames)
@@ -117,6 +118,15 @@ def _find_rims(part, cloud, bend, bridge):
     return Rims(
         gap, bridged, outward, np.cos(width / 2), beside, ends, margin, reach, np.zeros(len(gap)), crease, limit
     )
+
+
+def _of_other_lines(part, step, larger, lines):
+    """Which neighbours, by steps (n,k,3) from the samples of a `part` on lines, are to the side of the line and farther
+    than patches of the `larger` spacing (n,k) meet, (n,k) bool. They leave a gap between the lines."""
+    other, own = np.zeros(larger.shape, bool), np.flatnonzero(lines.number[part] >= 0)
+    far = row_dots(step[own], step[own]) > (2 * DISC * larger[own]) ** 2
+    other[own] = far & lines.aside(part.start + own, step[own])
+    return other
 
 
 def _widest_angles(place, same):

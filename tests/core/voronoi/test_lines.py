@@ -78,6 +78,20 @@ def test_elsewhere_nothing_changes(points):
     assert spacing_across_lines(points, spacing).tobytes() == spacing.tobytes()
 
 
+@pytest.mark.parametrize("gap", [5, 6, 8])
+@pytest.mark.parametrize("turn", [0.0, 0.37])
+def test_a_pipe_of_rings_is_one_tube(gap, turn):
+    """Flat rings were taken for sheets from 8 on, and slits were left between them from 5 on."""
+    n, rings = 64, 7
+    angle = 2 * np.pi * np.arange(n) / n + turn * np.arange(rings)[:, None]
+    height = np.repeat(2 * np.pi / n * gap * np.arange(rings), n)
+    points = np.stack([np.cos(angle).reshape(-1), np.sin(angle).reshape(-1), height], axis=1)
+    run = reconstruct(points, Settings(resolution=64, surface="both"))
+    assert len(shapes.components(run.surface)) == len(shapes.components(run.sheet)) == 1
+    assert (run.sheet.border_loops(), shapes.euler(run.sheet)) == (2, 0)
+    np.testing.assert_allclose(np.hypot(*run.sheet.vertices[:, :2].T), 1, atol=0.01)
+
+
 def test_a_sheet_of_lines_far_apart_is_one_piece():
     points, _ = lines(12)
     run = reconstruct(points, Settings(resolution=64, surface="both"))
