@@ -8,6 +8,7 @@ from .alone import WITHIN
 from .cases import SPOILED
 from .peers import PEERS
 from .report import ABSENT
+from .status import word
 from .tables import markdown_rows
 
 WORSE_BY = 1.3  # of the best peer's CD, at most
@@ -73,13 +74,13 @@ def verdicts(results: list[dict]) -> Iterator[str]:
         ratios = {r["case"]: over_best(r, name if name in contenders(r) else _DEFAULT) for r in clean}
         won = sum(ratio < 1 for ratio in ratios.values())
         worst = max(ratios, key=ratios.get)
-        word = ""
+        target = ""
         if name in finer:
             title = f"VAD, double cover, on a grid twice as fine where it is measured ({_listed_cases(clean, name)})"
         if name == _DEFAULT:
-            word = "**Met**: " if won >= SHARE * len(clean) and ratios[worst] <= WORSE_BY else "**Missed**: "
+            target = f"{word(won >= SHARE * len(clean) and ratios[worst] <= WORSE_BY)}: "
         yield (
-            f"{word}{title}: the lowest CD on {won} of {len(clean)} clean cases ({won / len(clean):.0%}; {SHARE:.0%} "
+            f"{target}{title}: the lowest CD on {won} of {len(clean)} clean cases ({won / len(clean):.0%}; {SHARE:.0%} "
             f"is asked); at worst {ratios[worst]:.2f} × the best peer's, on {worst} (at most {WORSE_BY} is asked)."
         )
     yield f"VAD, double cover, of these {len(clean)} by the other measures: {_firsts(clean)}."
@@ -148,7 +149,7 @@ def _within(times, key, name):
     few, middle = sum(ratio <= WITHIN for ratio in ratios), statistics.median(ratios)
     ours, theirs = (sum(measured[way][key] for measured in times.values()) for way in ("ours", "poisson"))
     return (
-        f"{'**Met**' if few == len(ratios) else '**Missed**'}: {name}: {min(ratios):.2f} to {max(ratios):.2f}, median "
+        f"{word(few == len(ratios))}: {name}: {min(ratios):.2f} to {max(ratios):.2f}, median "
         f"{middle:.2f}, all cases together {ours / theirs:.2f}; at most {WITHIN} on {few} of {len(ratios)} cases."
     )
 

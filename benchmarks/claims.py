@@ -10,8 +10,8 @@ from core.io.atomic import atomic_path
 from .against import SHARE, WORSE_BY, compared, over_best, shown
 from .alone import WITHIN
 from .cases import SAMPLINGS, SPOILED
-from .paper import DOCS, saved_runs
-from .status import DONE, exit_status
+from .paper import saved_runs
+from .status import DOCS, DONE, exit_status
 from .tables import markdown_rows
 
 README = DOCS.parent / "README.md"

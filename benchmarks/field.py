@@ -1,5 +1,6 @@
 """docs/field.md: `python -m benchmarks.field FOLDER` measures the distance field and writes the page."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -20,10 +21,9 @@ from .field_quality import FIELD, SLICED, case_fields, densities, density_slices
 from .field_rims import rims
 from .field_verdicts import verdicts
 from .peers import check_open3d
-from .status import page_command, said
+from .status import DOCS, page_command, said
 from .versions import listed, versions
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 CLOSED, OPEN, BAND = "spot_10k", "cloth_10k", "moebius_5k"
 UP = {CLOSED: 1, OPEN: 2}  # the axis drawn upwards
 _LIBRARIES = "numpy", "scipy", "libigl", "open3d"
@@ -128,7 +128,7 @@ sqrt(t), where `diffusion="grid"` refuses.
 Seconds on {closed}, points uniform by area; *normals*: facets and sweeps; *field*: patches, diffusion and integration
 in the whole box, by default. *published*: the paper's table, **on other hardware** (Core i9-10900, RTX 4090) and other
 shapes, so the ratio says how the methods' costs compare in magnitude and no more. Ours: by the clock / CPU seconds of
-all threads, a process of its own for every row, on two cores that much other work shared, so only the latter count.
+all threads, a process of its own for every row, on {cores} cores; other work on the machine shows less in the latter.
 The paper's grid is a cube of the resolution given, ours has this many cells along the longest side.
 
 ### Normals
@@ -198,6 +198,7 @@ def write_page(numbers: dict, pictures: dict, docs: Path) -> Path:
         quality="\n\n".join(_quality(sampling, results) for sampling, results in numbers["quality"].items()),
         closed=CLOSED,
         open=OPEN,
+        cores=os.cpu_count(),
         densities=tables.densities(numbers["densities"]),
         offsets=tables.offsets(numbers["offsets"]),
         lines=tables.lines(numbers["lines"]),

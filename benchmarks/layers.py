@@ -17,10 +17,9 @@ from .cases import SAMPLINGS, find_cases, has_sampling, load_case
 from .geometry import face_normals, surface_samples
 from .metrics import surface_errors
 from .peers import check_open3d
-from .status import page_command
+from .status import DOCS, page_command
 from .versions import listed, versions
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 PERCENTILES = (1, 25, 50, 75, 99)
 
 _LIBRARIES = "numpy", "scipy", "open3d"

@@ -27,11 +27,10 @@ from .normal_quality import (
 from .peers import check_open3d
 from .plots import plot_convergence, plot_growth
 from .report import Column, markdown_table
-from .status import page_command, said
+from .status import DOCS, page_command, said, word
 from .tables import markdown_rows
 from .versions import listed, versions
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
 _LIBRARIES = "numpy", "scipy", "open3d"
 
@@ -112,8 +111,8 @@ these the solver holds every axis back a little, which ends what still swings at
 
 Points of {shape} in random order. *stage*: facets and sweeps. *Delaunay*: `scipy.spatial.Delaunay` alone on the same
 points in the same process, right after; the best of three up to 100,000 points, a single run beyond. Local spacings,
-which the field needs as well, are not counted. Other work shares the two cores, so the ratio of CPU times is the one to
-trust. *peak*: resident memory of the whole process, libraries included.
+which the field needs as well, are not counted. Other work on the machine shows least in the ratio of CPU times.
+*peak*: resident memory of the whole process, libraries included.
 
 {cost}
 
@@ -184,24 +183,24 @@ def verdicts(measured: dict) -> Iterator[str]:
         clean = [result["error_ratio"] for result in results if result["category"] != "noisy"]
         ratio = float(np.mean(clean))
         yield (
-            f"{_word(ratio <= TARGET_RATIO)}, {sampling}: 1 − NC of the sweeps over that of the best PCA is "
+            f"{word(ratio <= TARGET_RATIO)}, {sampling}: 1 − NC of the sweeps over that of the best PCA is "
             f"{ratio:.2f} on average over the {len(clean)} cases without added noise (at most {TARGET_RATIO} is asked)."
         )
         if high := [r for r in results if r["category"] != "noisy" and r["error_ratio"] > TARGET_RATIO]:
             listed = "; ".join(f"{r['case']} {r['error_ratio']:.2f} ({r['faceting']:.2f})" for r in high)
             yield f"{sampling}: above {TARGET_RATIO} are, with what the truth's facets alone cost, {listed}."
         above = _above_pca(results, "pca")
-        yield f"{_word(not above)}, {sampling}: more error than the best PCA on {above or 'no case'} (none is asked)."
+        yield f"{word(not above)}, {sampling}: more error than the best PCA on {above or 'no case'} (none is asked)."
         if closer := _above_pca(results, "closer_pca"):
             yield f"{sampling}: a PCA over fewer than {PCA_NEIGHBOURS[0]} neighbours has less error yet on {closer}."
         gap = max(results, key=lambda result: result["start_gap"])
         yield (
-            f"{_word(gap['start_gap'] <= TARGET_GAP)}, {sampling}: random axes and the plane fit as the start of the "
+            f"{word(gap['start_gap'] <= TARGET_GAP)}, {sampling}: random axes and the plane fit as the start of the "
             f"sweeps differ by at most {gap['start_gap']:.5f} in NC, on {gap['case']} (at most {TARGET_GAP} is asked)."
         )
         higher = [result["case"] for result in results if result["distance_ratio"] > 1]
         yield (
-            f"{_word(not higher)}, {sampling}: the sweeps end with a higher E_d than Adam on {len(higher)} of "
+            f"{word(not higher)}, {sampling}: the sweeps end with a higher E_d than Adam on {len(higher)} of "
             f"{len(results)} cases (none is asked); they minimise a smooth bound of it, not E_d itself."
         )
         better = [result["case"] for result in results if result["adam"]["nc"] > result["sweeps"]["nc"]]
@@ -217,13 +216,13 @@ def verdicts(measured: dict) -> Iterator[str]:
         if run["points"] in TIMED:
             ratio = run["stage_cpu"] / run["delaunay_cpu"]
             yield (
-                f"{_word(ratio <= TARGET_TIME)}: the stage takes {ratio:.2f} × the CPU time of Delaunay alone at "
+                f"{word(ratio <= TARGET_TIME)}: the stage takes {ratio:.2f} × the CPU time of Delaunay alone at "
                 f"{run['points']:,} points (at most {TARGET_TIME:g} is asked)."
             )
     largest = measured["cost"][-1]
     peak = largest["peak_memory_mb"] / 2**10
     yield (
-        f"{_word(peak <= TARGET_MEMORY)}: {largest['points']:,} points peak at {peak:.1f} GiB "
+        f"{word(peak <= TARGET_MEMORY)}: {largest['points']:,} points peak at {peak:.1f} GiB "
         f"(at most {TARGET_MEMORY:g} is asked)."
     )
 
@@ -234,10 +233,6 @@ def _above_pca(results, method):
     return "; ".join(
         f"{r['case']} ({r['sweeps']['nc']:.4f}, {r[method]['nc']:.4f} at k = {r[method]['k']})" for r in worse
     )
-
-
-def _word(met):
-    return "**Met**" if met else "**Missed**"
 
 
 def _quality_tables(sampling, results):

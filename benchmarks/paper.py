@@ -10,10 +10,9 @@ from core.io.atomic import atomic_path
 from .cases import SAMPLINGS
 from .published import CATEGORIES, NON_WATERTIGHT, NORMALS, WATERTIGHT
 from .report import ABSENT, read_run
-from .status import DONE, exit_status
+from .status import DOCS, DONE, exit_status
 from .tables import markdown_rows
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = {"results": "for development", "bench": "made by script"}
 
 # Published shape -> our cases that bear the same name, or where there is none, of the same kind (marked so).

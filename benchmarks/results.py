@@ -13,9 +13,9 @@ from .repeatability import OURS
 from .report import markdown_tables
 from .run import PEER_LIMIT, TWICE_UP_TO, missing
 from .starts import FINE_FROM, ways_to_start
+from .status import DOCS
 
 _THREE_DIGITS = 5e-4
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 _INTRODUCTION = """\
 # Results

@@ -18,11 +18,10 @@ from .cases import find_cases, load_case
 from .geometry import surface_points
 from .peers import Clock, check_open3d, load_open3d, poisson
 from .processes import run_fresh
-from .status import page_command
+from .status import DOCS, page_command, word
 from .tables import markdown_rows
 from .versions import listed, versions
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPE = "spot_10k"
 POINTS = 100_000
 RUNS = (  # points, resolution, band, surface
@@ -193,19 +192,19 @@ def verdicts(measured: dict) -> Iterator[str]:
         peak = _run(measured, POINTS, resolution, band, "double")["peak_memory_mb"] / 2**10
         where = "in the whole box" if band is None else f"in a band of {band} cells"
         yield (
-            f"{_word(peak <= TARGET_MEMORY)}: {POINTS:,} points at {resolution}^3 {where} peak at {peak:.2f} GiB "
+            f"{word(peak <= TARGET_MEMORY)}: {POINTS:,} points at {resolution}^3 {where} peak at {peak:.2f} GiB "
             f"(at most {TARGET_MEMORY:g} is asked)."
         )
     coarse, fine = (_run(measured, POINTS, grid, 4, "double") for grid in GRIDS)
     growth = _exponent(coarse, fine, "resolution", "cpu")
     yield (
-        f"{_word(growth <= TARGET_GROWTH)}: in a band CPU time grows as the resolution to the power of {growth:.2f} "
+        f"{word(growth <= TARGET_GROWTH)}: in a band CPU time grows as the resolution to the power of {growth:.2f} "
         "(about 2 is asked)."
     )
     ratios = [run["estimate"]["memory_mb"] / run["peak_memory_mb"] for run in measured["runs"]]
     within = all(0.6 <= ratio <= 1.4 for ratio in ratios)
     yield (
-        f"{_word(within)}: memory said before the run is {min(ratios):.2f} to {max(ratios):.2f} of what it took "
+        f"{word(within)}: memory said before the run is {min(ratios):.2f} to {max(ratios):.2f} of what it took "
         "(within 40 % is asked)."
     )
 
@@ -217,10 +216,6 @@ def _run(measured, *key):
 
 def _exponent(low, high, axis, value):
     return float(np.log(high[value] / low[value]) / np.log(high[axis] / low[axis]))
-
-
-def _word(met):
-    return "**Met**" if met else "**Missed**"
 
 
 def _runs(measured):

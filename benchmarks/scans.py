@@ -19,10 +19,9 @@ from .peers import check_open3d, poisson
 from .pictures import View, caption, draw_points, draw_surface, save, sheet
 from .scanners import IMAGES, JUMP, SHARE, before_camera, depth_frame, depth_images, in_room, seen_from_one_spot
 from .shapes import rooms
-from .status import DONE, exit_status, said
+from .status import DOCS, DONE, exit_status, said
 from .versions import listed, versions
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 SHAPES = ("bumps_10k", "box_10k", "tangle_10k", "knot_10k", "candy_10k", "hemisphere_2k", "cloth_10k", "mask_5k")
 POINTS = 20_000
 FAR = 0.008  # distance from the surface from which on a flying point is far from it, a hundredth of the longest side

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from core import VADError
 
+DOCS = Path(__file__).resolve().parent.parent / "docs"
 DONE, CASE_FAILED, BAD_INPUT, CANCELLED = 0, 1, 2, 130
 
 
@@ -21,6 +22,11 @@ def exit_status(command: Callable[[], int]) -> int:
     except KeyboardInterrupt:
         print("error: cancelled", file=sys.stderr)
         return CANCELLED
+
+
+def word(met: bool) -> str:
+    """What is said of a target first."""
+    return "**Met**" if met else "**Missed**"
 
 
 def said(what: str, result):

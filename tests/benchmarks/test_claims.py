@@ -3,7 +3,7 @@
 import json
 
 from benchmarks.claims import END, README, START, claims, with_claims
-from benchmarks.paper import DOCS
+from benchmarks.status import DOCS
 
 
 def test_the_readme_is_up_to_date():

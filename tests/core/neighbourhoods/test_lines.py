@@ -47,6 +47,6 @@ def test_elsewhere_there_are_none(points):
 
 
 def test_a_few_in_a_row_are_no_line():
-    row = np.stack([np.arange(7) * 0.001, np.zeros(7), np.zeros(7)], axis=1)
-    points = np.concatenate([shapes.scattered_sphere(500), row + [3.0, 0, 0]])
+    row = np.stack([3 + np.arange(7) * 0.001, np.zeros(7), np.zeros(7)], axis=1)
+    points = np.concatenate([shapes.scattered_sphere(500), row])
     assert (lines_of(points).number == -1).all()
