@@ -77,24 +77,46 @@ def normals(path: Path) -> Path:
 
 
 def gaps(path: Path) -> Path:
-    """Holes, which the default leaves open and a larger `bridge` closes; wires and contours, which it joins."""
+    """Holes, which the default leaves open and a larger `bridge` closes; wires, contours, slices and rows, which it
+    joins."""
     holed, _ = pierced(closed.bumps(), 10_000, np.random.default_rng(0))
-    figure, (above, below) = sheet(2, 4)
+    figure, (above, *below) = sheet(3, 4)
     camera = View().camera(holed, _PIXELS)
     draw_points(above[0], holed, camera)
     caption(above[0], "holes six spacings wide", f"{len(holed):,} points")
     for panel, bridge in zip(above[1:], (Settings().bridge, 8.0, 14.0), strict=True):
         draw_surface(panel, reconstruct(holed, Settings(bridge=bridge)).surface, camera, View())
         caption(panel, f"bridge {bridge:g}{', the default' if bridge == Settings().bridge else ''}")
-    lines = ("wires", "torus_wires_3k", View((-0.4, -1.0, 1.1))), ("contours", "relief_contours_8k", View())
-    for (left, right), (title, name, view) in zip(below.reshape(2, 2), lines, strict=True):
-        points = sampled(name)[1]
+    lines = (
+        ("wires", sampled("torus_wires_3k")[1], View((-0.4, -1.0, 1.1))),
+        ("contours", sampled("relief_contours_8k")[1], View()),
+        ("slices, eight steps apart", _slices(), View((-0.5, -1.0, 0.4))),
+        ("rows, fifteen steps apart", _scan_rows(), View((0.4, -1.0, 0.9))),
+    )
+    for (left, right), (title, points, view) in zip(np.reshape(below, (4, 2)), lines, strict=True):
         camera = view.camera(points, _PIXELS)
         draw_points(left, points, camera)
         caption(left, title, f"{len(points):,} points")
         draw_surface(right, reconstruct(points).surface, camera, view)
         caption(right, "the default")
     return save(figure, path)
+
+
+def _slices(step=0.02, apart=8):
+    """Points on level slices of a twisted vase, a step along each, and so many from one to the next."""
+    rings = []
+    for height in np.arange(0, 2, apart * step):
+        radius = 0.5 + 0.15 * np.sin(2.5 * height)
+        turn = np.linspace(0, 2 * np.pi, int(2 * np.pi * radius / step), endpoint=False)
+        away = radius * (1 + 0.12 * np.cos(5 * turn + 1.5 * height))
+        rings.append(np.stack([away * np.cos(turn), away * np.sin(turn), np.full(len(turn), height)], axis=1))
+    return np.concatenate(rings)
+
+
+def _scan_rows(step=0.01, apart=15):
+    """Points in rows on a wavy sheet."""
+    x, y = (axis.reshape(-1) for axis in np.meshgrid(np.arange(-0.5, 0.5, step), np.arange(-0.5, 0.5, apart * step)))
+    return np.stack([x, y, 0.15 * np.sin(3 * x) * np.cos(2 * y)], axis=1)
 
 
 def limits(path: Path) -> Path:
