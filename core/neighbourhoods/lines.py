@@ -35,16 +35,16 @@ def find_lines(points: np.ndarray, spacing: np.ndarray, nearest: np.ndarray) -> 
     """The lines that samples (n,3) with local spacing (n,) are on, told from their `nearest` (n,k), k of 6 or more:
     where these follow each other in one direction, and so do theirs, and many in a row."""
     n, nearest = len(points), nearest[:, :_AROUND]
-    moments = outer(points[nearest[:, :_NEAREST]] - points[:, None]).sum(axis=1)
+    moments = sum(outer(points[other] - points) for other in nearest[:, :_NEAREST].T)
     chosen = _are_slender(moments)
     chosen &= chosen[nearest].mean(axis=1) >= _MANY
     own, along = np.flatnonzero(chosen), np.zeros((n, 3))
     away = np.linalg.norm(points[nearest[own]] - points[own, None], axis=2)
     row, column = np.nonzero((away <= _NEXT * spacing[own, None]) & chosen[nearest[own]])
     number = connected_parts(own[row], nearest[own[row], column], n)
-    own = own[np.bincount(number[own], minlength=n)[number[own]] >= _FEW]
-    along[own] = principal_axes(moments[own])
-    return Lines(np.where(np.isin(np.arange(n), own), number, -1), along)
+    chosen &= np.bincount(number[own], minlength=n)[number] >= _FEW
+    along[chosen] = principal_axes(moments[chosen])
+    return Lines(np.where(chosen, number, -1), along)
 
 
 def _are_slender(moments):

@@ -83,10 +83,11 @@ def voronoi_facets(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progr
     spacing : (n,) float64, local spacing of each sample, units of `points`
 
     Departures from the paper: sites are jittered by 1e-6 spacings, because Qhull is quadratic on cospherical and
-    coplanar input, and by 1e-3 those that a block of far sparser samples heeds, beside whose extent the former is lost
-    in rounding; facets are clipped, because far from the surface they say nothing about it, and the few that run
-    out to the box would outweigh all others; and facets between samples far apart, on either side of a hollow, are
-    left out, which makes the diagram local and changes mean |n.n_true| by less than 1e-4 (noise: 2e-4).
+    coplanar input. Where a block of sparse samples heeds far finer ones, it heeds one of them in each cell as fine,
+    jittered by 1e-3 spacings, since less is lost in rounding beside the block's extent. Facets are clipped, because far
+    from the surface they say nothing about it, and the few that run out to the box would outweigh all others. And
+    facets between samples far apart, on either side of a hollow, are left out, which makes the diagram local and
+    changes mean |n.n_true| by less than 1e-4 (noise: 2e-4).
 
     Raises :class:`InputError` where distances are too different in size for Qhull.
     """
@@ -176,7 +177,7 @@ def _sides(sites, stir, spacing, radius, block):
 
 
 def _heeded(sites, spacing, block):
-    """The members of a block, of those that are far finer than its own one in each cell of a grid as fine."""
+    """The members of a block, of those far finer than its own ones one in each cell of a grid as fine."""
     own = np.isin(block.members, block.own, assume_unique=True)
     size = _FINER * np.median(spacing[block.own])
     finer = np.flatnonzero(~own & (spacing[block.members] < size))

@@ -20,9 +20,9 @@ def zero_set(
     within: float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (v,3) and quads or triangles (f,4) or (f,3) of the zero set of signed distances (nx,ny,nz) float32 or
-    Blocks: at thin parts, which the signs of nodes do not show, they start off the surface and
-    are pulled in, as those of a double cover. Only where the nodes nearest to the vertices are `within` that distance:
-    where distances end, there is no surface."""
+    Blocks: at thin parts, which the signs of nodes do not show, they start off the surface and are pulled in, as those
+    of a double cover. Only where the nodes nearest to the vertices are `within` that distance: where distances end,
+    there is no surface."""
     if thin:
         values = each(np.copy, values)
         thin.lower(values, grid)

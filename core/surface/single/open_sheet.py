@@ -33,8 +33,7 @@ def open_sheet(
     progress=None,
 ) -> Mesh:
     """The zero set of signed distances (nx,ny,nz) float32 or Blocks near the surface, which :func:`two_sided` gives, on
-    its foot points and without what is past its rims: two faces at each edge or one, wound
-    alike, with ragged borders.
+    its foot points and without what is past its rims: two faces at each edge or one, wound alike, with ragged borders.
 
     passing : (n,) bool, the samples close to lines along which sheets pass through one another, see :class:`ThinParts`
     """
