@@ -31,8 +31,8 @@ class Settings:
     resolution: int = _option(
         128,
         "Grid cells along the longest side of the padded box. Twice the resolution shows detail half the size and "
-        "costs four to eight times the time and memory; once the points are a cell and a half apart, finer ones show "
-        "hardly more. Beyond 512 a band is needed",
+        "costs one and a half to six times the time and memory, less where points are many; once these are a cell and "
+        "a half apart, finer ones mostly show hardly more. Beyond 512 a band is needed",
         limits=(16, 2048),
         unit="cells",
     )
