@@ -326,6 +326,15 @@ def test_a_scan_too_small_for_openvdb_has_the_rest_with_a_warning(capsys, tmp_pa
     assert "ball.vdb is not written: cells are" in err
 
 
+@pytest.fixture
+def ctrl_c_heeded():
+    """Also where the tests run in the background of a shell that has it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c_heeded")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("presses", [1, 2])
 def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkeypatch, presses, number):
@@ -492,6 +501,7 @@ def test_a_real_process_from_scan_to_files(scan, tmp_path):
     assert np.abs(np.linalg.norm(vertices - [1000, 0, 0], axis=1) - 1).max() < 0.2
 
 
+@pytest.mark.usefixtures("ctrl_c_heeded")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     command = [sys.executable, "-m", "core", "reconstruct", scan, "-o", str(tmp_path / "out")]
