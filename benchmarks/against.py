@@ -58,6 +58,11 @@ def compared(results: list[dict]) -> list[dict]:
     return [result for result in shown(results) if best_peer(result)]
 
 
+def unmatched(results: list[dict]) -> list[str]:
+    """Names of the others, on which no peer came to an end."""
+    return [result["case"] for result in shown(results) if not best_peer(result)]
+
+
 def over_best(result: dict, ours: str = _DEFAULT) -> float:
     """The CD of one of our surfaces over that of the best peer."""
     return contenders(result)[ours]["cd"] / result["peers"][best_peer(result)]["cd"]
@@ -84,7 +89,7 @@ def verdicts(results: list[dict]) -> Iterator[str]:
             f"is asked); at worst {ratios[worst]:.2f} × the best peer's, on {worst} (at most {WORSE_BY} is asked)."
         )
     yield f"VAD, double cover, of these {len(clean)} by the other measures: {_firsts(clean)}."
-    if alone := [result["case"] for result in shown(results) if not best_peer(result)]:
+    if alone := unmatched(results):
         yield f"Not counted, as no peer came to an end there: {', '.join(alone)}."
     for result in compared(results):
         if over_best(result) >= 1:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from core.io.atomic import atomic_path
 
-from .against import SHARE, WORSE_BY, compared, over_best, shown
+from .against import SHARE, WORSE_BY, compared, over_best, unmatched
 from .alone import WITHIN
 from .cases import SAMPLINGS, SPOILED
 from .paper import saved_runs
@@ -79,12 +79,8 @@ def _spoiled(docs):
     spoiled = [result for run in runs for result in compared(run["cases"]) if result["category"] in SPOILED]
     won = sum(over_best(result) < 1 for result in spoiled)
     said = f"With noise, strays, holes or wires it has the lowest CD on {won} of {len(spoiled)} cases"
-    alone = sorted({result["case"] for run in runs for result in shown(run["cases"])} - _compared(runs))
+    alone = [name for run in runs for name in unmatched(run["cases"])]
     return f"{said}.\nNo count has {', '.join(alone)}, where no other came to an end." if alone else f"{said}."
-
-
-def _compared(runs):
-    return {result["case"] for run in runs for result in compared(run["cases"])}
 
 
 def _memory(run):

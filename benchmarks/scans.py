@@ -19,6 +19,7 @@ from .peers import check_open3d, poisson
 from .pictures import View, caption, draw_points, draw_surface, save, sheet
 from .scanners import IMAGES, JUMP, SHARE, before_camera, depth_frame, depth_images, in_room, seen_from_one_spot
 from .shapes import rooms
+from .starts import FILTER, without_strays
 from .status import DOCS, DONE, exit_status, said
 from .versions import listed, versions
 
@@ -30,7 +31,6 @@ ROOM_NOISE = 0.0, 0.1, 0.3  # per cent of the longest side
 FRAME_WIDTH = 320  # pixels
 FRAMES = (1.5, 0.0), (1.5, 0.3), (4.0, 0.0), (4.0, 0.3), (8.0, 0.5)  # pixels to a step of depth; noise, steps
 FRAME_SHOWN = FRAMES[3]
-FILTER = 20, 2.0  # neighbours and standard deviations of Open3D's statistical filter
 
 _FEET = 100_000
 _PIXELS = 480
@@ -129,11 +129,7 @@ def measure_images(name: str, count: int = POINTS) -> dict:
 
 
 def _filtered_poisson(points, truth):
-    import open3d
-
-    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
-    kept = cloud.remove_statistical_outlier(*FILTER)[1]
-    return cd_and_hd(poisson(points[np.asarray(kept)])[0], truth)
+    return cd_and_hd(poisson(without_strays(points))[0], truth)
 
 
 def measure_room(count: int, percent: float) -> dict:

@@ -8,11 +8,11 @@ import numpy as np
 FINE_FROM = 100_000  # points of a case from which a grid twice as fine is measured, too
 DEPTHS = 8, 9  # of Poisson's octree; the second from so many points on alone
 JET_NEIGHBOURS = 24
+FILTER = 20, 2.0  # neighbours and standard deviations of Open3D's statistical filter
 
 _NEIGHBOURS = 30, 12, 8  # of a normal; up to so many points all, of more the first alone
 _UP_TO = 20_000
 _ORIENTATION = 15  # neighbours, but no more than a normal has
-_STRAYS = 20, 2.0  # neighbours, and standard deviations of their mean distance that points may be off
 _DROPPED, _SMOOTHED = "strays dropped", "smoothed"
 _CLEANINGS = {"outliers": (None, _DROPPED), "noisy": (None, _SMOOTHED)}  # by category
 
@@ -53,7 +53,7 @@ def ways_to_start() -> str:
         f"normals over the best number of neighbours, {few} ({most} on more than {_UP_TO:,} points), oriented along "
         f"tangent planes over {_ORIENTATION} or as many; Poisson's depth {DEPTHS[0]}, from {FINE_FROM:,} points on the "
         f"better of that and {DEPTHS[1]}; on points with strays also without those whose mean distance to "
-        f"{_STRAYS[0]} neighbours is {_STRAYS[1]:g} standard deviations above the mean (Open3D), on noisy ones also "
+        f"{FILTER[0]} neighbours is {FILTER[1]:g} standard deviations above the mean (Open3D), on noisy ones also "
         f"smoothed by jets over {JET_NEIGHBOURS} (CGAL), if that is better"
     )
 
@@ -63,8 +63,13 @@ def readied(points: np.ndarray, start: Start) -> np.ndarray:
     if start.cleaning == _SMOOTHED:
         return smoothed(points)
     if start.cleaning == _DROPPED:
-        return np.asarray(_cloud(points).remove_statistical_outlier(*_STRAYS)[0].points)
+        return without_strays(points)
     return points
+
+
+def without_strays(points: np.ndarray) -> np.ndarray:
+    """The points (n,3) that Open3D's statistical filter leaves."""
+    return np.asarray(_cloud(points).remove_statistical_outlier(*FILTER)[0].points)
 
 
 def oriented(points: np.ndarray, neighbours: int):

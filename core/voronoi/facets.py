@@ -134,11 +134,9 @@ def by_blocks(
 
 def _sides(sites, stir, spacing, radius, block):
     """Sides of the facets whose pair's sample with the larger spacing, or the first of equals, is the block's own."""
-    members = _heeded(sites, spacing, block)
-    count = len(members)
-    spacing, own = spacing[members], np.isin(members, block.own, assume_unique=True)
+    members, own, finer = _heeded(sites, spacing, block)
+    count, spacing = len(members), spacing[members]
     beyond = radius[block.own].max() if count < len(sites) else 0.0  # the outermost of all have nothing to heed there
-    finer = ~own & (spacing < _FINER * np.median(spacing[own]))
     sites = sites[members] + np.where(finer[:, None], stir[members], 0.0)
     sites -= sites.mean(axis=0)  # a frame of their own, which takes no digits from distances
     sites = np.concatenate([sites, _corners(sites, beyond)])
@@ -177,16 +175,16 @@ def _sides(sites, stir, spacing, radius, block):
 
 
 def _heeded(sites, spacing, block):
-    """The members of a block, of those far finer than its own ones one in each cell of a grid as fine."""
+    """The members of a block, of those far finer than its own ones one in each cell of a grid as fine; and which of
+    these are its own, and which finer."""
     own = np.isin(block.members, block.own, assume_unique=True)
     size = _FINER * np.median(spacing[block.own])
-    finer = np.flatnonzero(~own & (spacing[block.members] < size))
-    kept = np.ones(len(own), bool)
-    if len(finer):
-        cell = np.floor(sites[block.members[finer]] / size).astype(np.int64)
-        kept[finer] = False
-        kept[finer[np.unique(cell, axis=0, return_index=True)[1]]] = True
-    return block.members[kept]
+    finer = ~own & (spacing[block.members] < size)
+    row, kept = np.flatnonzero(finer), ~finer
+    if len(row):
+        cell = np.floor(sites[block.members[row]] / size).astype(np.int64)
+        kept[row[np.unique(cell, axis=0, return_index=True)[1]]] = True
+    return block.members[kept], own[kept], finer[kept]
 
 
 def _tetrahedra(sites):
