@@ -272,3 +272,35 @@ def test_estimates_follow_the_scale():
     here, there = estimate_noise(points), estimate_noise(4 * points)
     np.testing.assert_allclose(there.level, 4 * here.level, rtol=1e-6)
     np.testing.assert_allclose(there.neighbours, here.neighbours, rtol=1e-6)
+
+
+def range_image(across: int, down: int) -> np.ndarray:
+    """A ball seen by a pinhole camera at (0, 0, 5), with noise along the rays, turned."""
+    x, y = np.meshgrid(np.linspace(-0.21, 0.21, across), np.linspace(-0.21, 0.21, down))
+    rays = np.stack([x, y, -np.ones_like(x)], axis=-1).reshape(-1, 3)
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    towards = -5 * rays[:, 2]
+    hit = towards**2 > 24
+    rays, depth = rays[hit], towards[hit] - np.sqrt(towards[hit] ** 2 - 24)
+    depth += 0.3 * 0.42 * 4 / np.sqrt(across * down) * np.random.default_rng(0).normal(size=len(depth))
+    return (np.array([0, 0, 5]) + depth[:, None] * rays) @ shapes.random_rotation(1)
+
+
+@pytest.mark.parametrize("pixels", [(110, 110), (200, 80)])
+def test_noise_along_the_rays_of_a_scanner_is_noise(pixels):
+    """Each row and column of the picture stays in a plane with the eye, as samples on faces do."""
+    points = range_image(*pixels)
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
+def test_faces_that_meet_in_points_are_faces():
+    """Those of a torus between two circles of latitude meet on its axis."""
+    turn, tilt = np.meshgrid(np.arange(96) * np.pi / 48, np.arange(24) * np.pi / 12)
+    corner = np.stack([turn, tilt], axis=-1)
+    radius = 1 + 0.25 * np.cos(corner[..., 1])
+    ring = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.25 * np.sin(tilt)], axis=-1)[::2, ::2]
+    below, beside = np.roll(ring, 1, axis=0), np.roll(ring, 1, axis=1)
+    middle = (ring + below + beside + np.roll(below, 1, axis=1)) / 4
+    points = np.concatenate([each.reshape(-1, 3) for each in (ring, (ring + below) / 2, (ring + beside) / 2, middle)])
+    points = points @ shapes.random_rotation(1)
+    assert not noisy_samples(points, local_spacing(points)).any()
