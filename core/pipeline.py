@@ -125,7 +125,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
     }
     progress.part(0.0, 1.0, "report")(1.0)
     row = samples.given_order()
-    near = replace(near, sample=np.argsort(row).astype(np.int32)[near.sample])
+    near = replace(near, sample=np.argsort(row).astype(np.int32)[local.source[near.sample]])
     return Reconstruction(
         points=samples.given[row],
         source_index=samples.source_index[row],

@@ -245,7 +245,7 @@ def _extracted(task, progress):
     skin = None
     if mesh := found.meshes.get("double"):
         off = np.linalg.norm(local.project(mesh.vertices, progress.part(0.9, 1.0)).step, axis=1) * samples.scale
-        nearest = local.tree.query(mesh.vertices, workers=-1)[1]
+        nearest = local.source[local.tree.query(mesh.vertices, workers=-1)[1]]
         skin = Skin(samples.to_input_units(mesh.vertices), mesh.quads, mesh.triangles, nearest, off)
     seconds = time.perf_counter() - start
     return Outcome(

@@ -18,6 +18,7 @@ from .grid import Grid
 from .patches import Patches
 from .projection import NEAREST, Projection, project
 from .rims.borders import Rims, find_rims
+from .rims.line_creases import samples_beside_creases
 from .rims.line_gaps import with_line_gaps_bridged
 from .rims.rim_lines import with_rim_lines
 from .rims.sampling_gaps import with_openings_kept, with_sampling_gaps_bridged, with_sparser_parts_joined
@@ -48,6 +49,7 @@ class LocalSurface:
     confidence      : (n,) float64 in [0,1], of the normals
     room            : (n,) float64, half the distance to the sheet beside each one's own, see :func:`sheet_room`
     bridge          : gaps up to this many local spacings are closed
+    source          : (n,) int64, the sample given that each is, or is added beside, see :mod:`.rims.line_creases`
     """
 
     points: np.ndarray
@@ -59,6 +61,7 @@ class LocalSurface:
     bridge: float
     rims: Rims
     tree: KDTree
+    source: np.ndarray
 
     @cached_property
     def columns(self) -> Columns:
@@ -86,9 +89,10 @@ class LocalSurface:
 
 def fit_local_surface(points, normals, confidence, spacing, bridge: float, progress=None) -> LocalSurface:
     """Patches and rims of distinct samples (n,3) with axes (n,3) of any length, their confidence (n,) in [0,1] and
-    local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Raises :class:`InputError` for
-    other shapes, what is not finite, axes without a direction, spacings not above 0, and points that span more or less
-    than single precision holds the fourth powers of."""
+    local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Some may be added beside creases,
+    after those given, see :mod:`.rims.line_creases`. Raises :class:`InputError` for other shapes, what is not finite,
+    axes without a direction, spacings not above 0, and points that span more or less than single precision holds the
+    fourth powers of."""
     progress, points = Progress.of(progress), finite_points(points, least=2)
     span = float(np.ptp(points, axis=0).max())
     if not _SMALLEST < span < _LARGEST:
@@ -98,6 +102,18 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
         )
     normals, confidence = known_normals((normals, confidence), len(points), slice(None))
     spacing = spacing_of(points, spacing)
+    given = points, normals, confidence, spacing, np.arange(len(points))
+    local, cloud = _fitted(*given, bridge, None, progress.part(0.0, 0.9))
+    added = samples_beside_creases(local.rims, cloud)
+    if not len(added.beside):
+        return local
+    more = added.points, added.normals, confidence[added.beside], spacing[added.beside], added.beside
+    given = (np.concatenate(pair) for pair in zip(given, more, strict=True))
+    return _fitted(*given, bridge, added, progress.part(0.9, 1.0))[0]
+
+
+def _fitted(points, normals, confidence, spacing, source, bridge, added, progress):
+    """The local surface of samples, the last of which may be `added`, and the samples with those around each."""
     cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))
     room = sheet_room(cloud, progress.part(0.1, 0.2))
     bend = bending(cloud, room, progress.part(0.2, 0.5))
@@ -105,6 +121,8 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     rims = with_openings_kept(rims, cloud, bridge, progress.part(0.84, 0.86))
     rims = with_sparser_parts_joined(rims, cloud, bridge, progress.part(0.86, 0.87))
     rims = with_line_gaps_bridged(rims, cloud, bridge, progress.part(0.87, 0.88))
+    if added is not None:
+        rims = added.joined(rims, cloud)
     rims = with_sampling_gaps_bridged(rims, cloud, bend, bridge, progress.part(0.88, 0.9))
     rims = with_rim_lines(rims, cloud, progress.part(0.9, 1.0))
-    return LocalSurface(points, normals, spacing, bend, confidence, room, bridge, rims, cloud.tree)
+    return LocalSurface(points, normals, spacing, bend, confidence, room, bridge, rims, cloud.tree, source), cloud
