@@ -225,9 +225,8 @@ def _spare(scan, folder, arrays):
     report = report_of(folder / f"{scan.stem}{_REPORT}")
     if report and (other := Path(report["scan"])).is_file() and not other.samefile(scan):
         raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
-    known = {Path(str(path)).name for path in report.get("files", ())}
     for path in there:
-        if path.name not in known and not is_own(path):
+        if not is_own(path):
             raise InputError(f"{path} is there, and was not made by this program; give another folder for the results")
 
 

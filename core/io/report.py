@@ -30,7 +30,7 @@ def report_of(path: str | os.PathLike) -> dict:
     except (OSError, ValueError):
         return {}
     sound = isinstance(report, dict) and report.keys() >= _OF_A_RUN and isinstance(report.get("scan"), str)
-    return report if sound and isinstance(report.get("files", []), list) else {}
+    return report if sound else {}
 
 
 def _plain(value):

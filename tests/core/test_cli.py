@@ -281,10 +281,20 @@ def test_results_of_a_run_that_was_killed_before_its_report_are_replaced(capsys,
     assert run(capsys, *arguments)[0] == 0
     (tmp_path / "out" / "ball.json").unlink()
     assert run(capsys, *arguments)[0] == 0
-    for path in (tmp_path / "out").iterdir():
-        if path.suffix != ".json":
-            path.write_bytes(b"older, and listed in the report")
     assert run(capsys, *arguments)[0] == 0
+
+
+def test_a_file_that_a_user_saved_over_a_result_stays(capsys, scan, calls, tmp_path):
+    """Its name in the report of an earlier run does not make it ours."""
+    arguments = "reconstruct", scan, "-o", tmp_path / "out", "--arrays"
+    assert run(capsys, *arguments)[0] == 0
+    for ending in ("_double.ply", "_points.ply", ".vdb", ".npz"):
+        path = tmp_path / "out" / f"ball{ending}"
+        written = path.read_bytes()
+        path.write_bytes(b"edited")
+        assert f"{path} is there, and was not made by this program" in refused(capsys, *arguments)
+        assert path.read_bytes() == b"edited"
+        path.write_bytes(written)
 
 
 def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan, calls):
