@@ -25,7 +25,7 @@ from .io.npz import write_arrays
 from .io.own_files import is_own
 from .io.ply import write_mesh, write_points
 from .io.points import READERS, read_points, read_scan
-from .io.report import report_json, report_of, write_report
+from .io.report import digest_of, report_json, report_of, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
 from .points import first_of_each, local_spacing, prepare_samples
@@ -64,7 +64,7 @@ files in the folder OUT, named after the scan, each written whole or not at all:
                    field), gradient (at every node); with a band those of blocks of 8^3 nodes, with block (the lowest
                    node of each), shape and band; for the nodes near the surface node (i,j,k), direction (unit, away
                    from the surface) and foot (the nearest point of the surface)
-  SCAN.json        settings, counts, seconds, warnings; written last
+  SCAN.json        settings, counts, seconds, warnings, the scan's path and SHA-256 (digest); written last
 All are in the scan's own units and place. Vertices of meshes have the properties distance (how far off the surface)
 and confidence (of the nearest sample). Meshes and points also carry what the points of a .ply do, of a table whose
 columns have names or of a scanner's .pts: colours (red, green, blue), intensity and every other property that is one
@@ -202,19 +202,20 @@ def _number(text):
 def _reconstruct(given):
     settings = Settings(**{name: getattr(given, name) for name in options()})
     points, carried = read_scan(given.scan)
+    digest = digest_of(given.scan)
     if given.output.suffix.lower() in (*READERS, _VOLUME, _REPORT) and not given.output.exists():
         raise InputError(f"{given.output} is to be a folder, in which files are named after the scan; give its name")
     folder = writable_folder(given.output)
-    _spare(given.scan, folder, given.arrays)
+    _spare(given.scan, digest, folder, given.arrays)
     with _progress() as progress:
         result = reconstruct(points, settings, progress=progress)
-    report = _write(result, carried, folder, given.scan, given.gradient, given.arrays)
+    report = _write(result, carried, folder, given.scan, digest, given.gradient, given.arrays)
     for warning in report["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
     print(report_json(report) if given.json else _summary(report))
 
 
-def _spare(scan, folder, arrays):
+def _spare(scan, digest, folder, arrays):
     """Raise :class:`InputError` where a file that is to be written is the scan itself, a result of another scan, or one
     that this program did not make."""
     endings = _POINTS, _VOLUME, *_MESHES.values(), *([_ARRAYS] if arrays else []), _REPORT
@@ -223,8 +224,10 @@ def _spare(scan, folder, arrays):
         if path.samefile(scan):
             raise InputError(f"{path} would replace the scan, which is that file; give another folder for the results")
     report = report_of(folder / f"{scan.stem}{_REPORT}")
-    if report and (other := Path(report["scan"])).is_file() and not other.samefile(scan):
-        raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
+    if report:
+        other = Path(report["scan"])
+        if not (other.samefile(scan) if other.is_file() else report.get("digest") == digest):  # it may have been moved
+            raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
     for path in there:
         if not is_own(path):
             raise InputError(f"{path} is there, and was not made by this program; give another folder for the results")
@@ -259,7 +262,7 @@ def _progress():
             signal.signal(number, handler)
 
 
-def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
+def _write(result: Reconstruction, carried, folder, scan, digest, gradient, arrays):
     """Write every file; the report, which lists them, goes last. Returns the report."""
     samples = dict(points=result.points, normals=result.normals, attributes=sample_attributes(result, carried))
     writers = {
@@ -274,7 +277,8 @@ def _write(result: Reconstruction, carried, folder, scan, gradient, arrays):
         writers[_ARRAYS] = partial(write_arrays, result=result)
 
     summary = folder / f"{scan.stem}{_REPORT}"
-    report = {**result.report, "scan": scan.absolute(), "files": [], "warnings": list(result.report["warnings"])}
+    report = {**result.report, "scan": scan.absolute(), "digest": digest}
+    report |= {"files": [], "warnings": list(result.report["warnings"])}
     for ending in (_VOLUME, *_MESHES.values(), _ARRAYS):
         if ending not in writers and (path := folder / f"{scan.stem}{ending}").exists():
             report["warnings"].append(f"{path} is not of this run, which does not write it")

@@ -1,5 +1,6 @@
 """Reports as strict JSON."""
 
+import hashlib
 import json
 import math
 import os
@@ -31,6 +32,12 @@ def report_of(path: str | os.PathLike) -> dict:
         return {}
     sound = isinstance(report, dict) and report.keys() >= _OF_A_RUN and isinstance(report.get("scan"), str)
     return report if sound else {}
+
+
+def digest_of(path: str | os.PathLike) -> str:
+    """SHA-256 of the file `path`, by which the report of a scan knows it where it was moved."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _plain(value):

@@ -241,7 +241,7 @@ def test_empty_paths_are_refused(capsys, scan, calls, tmp_path, monkeypatch):
 
 
 def test_results_of_another_scan_of_that_name_stay(capsys, scan, calls, tmp_path, monkeypatch):
-    """Whether its name has another ending or it lies in another folder, and again where the first scan is gone."""
+    """Whether its name has another ending or it lies in another folder, and where the first scan is gone."""
     monkeypatch.chdir(tmp_path)
     assert run(capsys, "reconstruct", "ball.npy", "-o", "out")[0] == 0
     written = (tmp_path / "out" / "ball.json").read_bytes()
@@ -254,7 +254,18 @@ def test_results_of_another_scan_of_that_name_stay(capsys, scan, calls, tmp_path
     monkeypatch.chdir(tmp_path / "b")
     assert run(capsys, "reconstruct", "../ball.npy", "-o", "../out")[0] == 0
     os.remove(scan)
-    assert run(capsys, "reconstruct", "ball.npy", "-o", "../out")[0] == 0
+    np.save("ball.npy", np.load("ball.npy") + 1)
+    written = (tmp_path / "out" / "ball.json").read_bytes()
+    assert "out holds the results of" in refused(capsys, "reconstruct", "ball.npy", "-o", "../out")
+    assert (tmp_path / "out" / "ball.json").read_bytes() == written
+
+
+def test_a_scan_that_was_moved_updates_its_results(capsys, scan, calls, tmp_path):
+    assert run(capsys, "reconstruct", scan, "-o", tmp_path / "out")[0] == 0
+    (tmp_path / "b").mkdir()
+    moved = Path(scan).rename(tmp_path / "b" / "ball.npy")
+    assert run(capsys, "reconstruct", moved, "-o", tmp_path / "out")[0] == 0
+    assert json.loads((tmp_path / "out" / "ball.json").read_text())["scan"] == str(moved)
 
 
 @pytest.mark.parametrize("ending", ["_points.ply", "_double.ply", "_signed.ply", ".vdb", ".npz", ".json"])
