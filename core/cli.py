@@ -20,7 +20,7 @@ from .cleaning.noise import looks_noisy
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
 from .field.grid import fit_grid
-from .io.atomic import writable_folder
+from .io.atomic import together, writable_folder
 from .io.npz import write_arrays
 from .io.own_files import is_own
 from .io.ply import write_mesh, write_points
@@ -54,7 +54,7 @@ With --json, stdout holds one JSON document and nothing else: the report, or {{"
 stderr.
 """
 _OUTPUTS = """\
-files in the folder OUT, named after the scan, each written whole or not at all:
+files in the folder OUT, named after the scan, all of them written whole or none at all:
   SCAN.vdb         OpenVDB grids: udf (distance to the surface; sdf where signed) and density (fog to look at)
   SCAN_double.ply  mesh: the closed two-sided cover of the surface (with --surface double or both)
   SCAN_single.ply  mesh: one layer, open where the surface is (with --surface single or both)
@@ -263,7 +263,7 @@ def _progress():
 
 
 def _write(result: Reconstruction, carried, folder, scan, digest, gradient, arrays):
-    """Write every file; the report, which lists them, goes last. Returns the report."""
+    """Write every file, all of them or none; the report, which lists them, goes last. Returns the report."""
     samples = dict(points=result.points, normals=result.normals, attributes=sample_attributes(result, carried))
     writers = {
         _POINTS: partial(write_points, **samples),
@@ -282,15 +282,16 @@ def _write(result: Reconstruction, carried, folder, scan, digest, gradient, arra
     for ending in (_VOLUME, *_MESHES.values(), _ARRAYS):
         if ending not in writers and (path := folder / f"{scan.stem}{ending}").exists():
             report["warnings"].append(f"{path} is not of this run, which does not write it")
-    for ending, write in writers.items():
-        path = folder / f"{scan.stem}{ending}"
-        try:
-            write(path)
-            report["files"].append(path)
-        except (InputError, MissingDependency) as error:
-            report["warnings"].append(f"{path} is not written: {error}")
-    report["files"].append(summary)
-    write_report(summary, report)
+    with together():
+        for ending, write in writers.items():
+            path = folder / f"{scan.stem}{ending}"
+            try:
+                write(path)
+                report["files"].append(path)
+            except (InputError, MissingDependency) as error:
+                report["warnings"].append(f"{path} is not written: {error}")
+        report["files"].append(summary)
+        write_report(summary, report)
     return report
 
 

@@ -5,14 +5,40 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import local
 from uuid import uuid4
 
 from ..errors import VADError
 
+_kept = local()  # `waiting`, the files that are to take their places together, where some are: (temporary, path)
+
+
+@contextmanager
+def together() -> Iterator[None]:
+    """Within, files of :func:`atomic_path` wait for each other: they take their places in the order they were written,
+    when the block ends without an error, else none of them does.
+
+    The last one tells of the others: an old one in its place goes before they do, so that it is never untrue.
+    """
+    _kept.waiting = waiting = []
+    try:
+        yield
+        for _, path in waiting[-1:]:
+            with _errors_of(path):
+                path.unlink(missing_ok=True)
+        for temporary, path in waiting:
+            with _errors_of(path):
+                os.replace(temporary, path)
+    finally:
+        del _kept.waiting
+        for temporary, _ in waiting:
+            _remove(temporary)
+
 
 @contextmanager
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a temporary path beside `path` to write to; it takes `path`'s place when the block ends without an error.
+    """Yield a temporary path beside `path` to write to; it takes `path`'s place when the block ends without an error,
+    or later, see :func:`together`.
 
     Whatever else happens, Ctrl-C included, `path` stays as it was and the temporary file is removed. An OSError
     (folder missing or not writable, disk full) becomes a :class:`VADError` of one line.
@@ -21,18 +47,35 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     if not path.name:
         raise VADError(f"'{path}' is a folder; give the path of a file")
     temporary = path.with_name(f".{uuid4().hex}{path.suffix}")
+    waiting = getattr(_kept, "waiting", None)
     try:
-        yield temporary
-        with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
+        with _errors_of(path):
+            yield temporary
+            with open(temporary, "rb+") as file:
+                os.fsync(file.fileno())
+            if waiting is None:
+                os.replace(temporary, path)
+    except BaseException:
+        _remove(temporary)
+        raise
+    if waiting is not None:
+        waiting.append((temporary, path))
+
+
+@contextmanager
+def _errors_of(path):
+    """Makes a :class:`VADError` of one line, that names the file, of an OSError."""
+    try:
+        yield
     except OSError as error:
         raise VADError(
             f"{path} cannot be written ({error.strerror or error}); free space there or choose another folder"
         ) from error
-    finally:
-        with suppress(OSError):  # an unreachable folder was reported above
-            temporary.unlink(missing_ok=True)
+
+
+def _remove(temporary):
+    with suppress(OSError):  # an unreachable folder was reported before
+        temporary.unlink(missing_ok=True)
 
 
 def writable_folder(path: str | os.PathLike) -> Path:

@@ -12,6 +12,7 @@ import pytest
 from plyfile import PlyData
 
 from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
+from core.io.atomic import atomic_path
 from core.io.openvdb_module import load_openvdb
 from core.io.ply import write_points
 from core.io.points import read_points, read_scan
@@ -306,6 +307,23 @@ def test_a_file_that_a_user_saved_over_a_result_stays(capsys, scan, calls, tmp_p
         assert f"{path} is there, and was not made by this program" in refused(capsys, *arguments)
         assert path.read_bytes() == b"edited"
         path.write_bytes(written)
+
+
+@pytest.mark.parametrize("failing", ["write_vdb", "write_mesh", "write_arrays", "write_report"])
+def test_a_run_that_fails_while_it_writes_changes_nothing(capsys, scan, calls, tmp_path, monkeypatch, failing):
+    folder = tmp_path / "out"
+    arguments = "reconstruct", scan, "-o", folder, "--arrays"
+    assert run(capsys, *arguments)[0] == 0
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+
+    def full(path, *given, **named):
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(b"half")
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(cli, failing, full)
+    assert "cannot be written (No space left on device)" in refused(capsys, *arguments, "--surface", "both")
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan, calls):

@@ -4,7 +4,7 @@ import resource
 import pytest
 
 from core import VADError
-from core.io.atomic import atomic_path, writable_folder
+from core.io.atomic import atomic_path, together, writable_folder
 
 
 def test_a_finished_file_replaces_the_old_one(tmp_path):
@@ -30,6 +30,36 @@ def test_a_failure_midway_leaves_the_old_file_and_nothing_else(tmp_path, failure
     with pytest.raises(failure):
         broken()
     assert target.read_text() == "old"
+    assert os.listdir(tmp_path) == ["file.txt"]
+
+
+def write_both(folder, text, failure=None):
+    with together():
+        for name in ("file.txt", "report.txt"):
+            with atomic_path(folder / name) as temporary:
+                temporary.write_text(text)
+        if failure:
+            raise failure
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt, VADError])
+def test_files_written_together_take_their_places_at_the_end_or_not_at_all(tmp_path, failure):
+    with pytest.raises(failure):
+        write_both(tmp_path, "old", failure)
+    assert os.listdir(tmp_path) == []
+    write_both(tmp_path, "old")
+    with pytest.raises(failure):
+        write_both(tmp_path, "new", failure)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file.txt": "old", "report.txt": "old"}
+    write_both(tmp_path, "new")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file.txt": "new", "report.txt": "new"}
+
+
+def test_where_one_cannot_take_its_place_no_old_report_is_left(tmp_path):
+    (tmp_path / "report.txt").write_text("old")
+    (tmp_path / "file.txt" / "of_others").mkdir(parents=True)
+    with pytest.raises(VADError, match=r"file\.txt cannot be written"):
+        write_both(tmp_path, "new")
     assert os.listdir(tmp_path) == ["file.txt"]
 
 
