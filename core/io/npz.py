@@ -1,6 +1,7 @@
 """The field as plain arrays, for other programs to extract surfaces from."""
 
 import os
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 
@@ -40,15 +41,16 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
         values |= dict(shape=field.shape, band=field.band)
     else:
         values, gradient = dict(values=field.values), node_gradient(field.values, field.spacing)
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(
-            file,
-            **values,
-            origin=field.origin,
-            spacing=field.spacing,
-            signed=field.sdf,
-            gradient=gradient,
-            node=node.astype(np.int32),
-            direction=unit(near.step).astype(np.float32),
-            foot=field.origin + field.spacing * node - near.step,
-        )
+    arrays = values | dict(
+        origin=field.origin,
+        spacing=field.spacing,
+        signed=field.sdf,
+        gradient=gradient,
+        node=node.astype(np.int32),
+        direction=unit(near.step).astype(np.float32),
+        foot=field.origin + field.spacing * node - near.step,
+    )
+    with atomic_path(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():  # numpy.savez would leave the archive open where the disk is full
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=False)
