@@ -1,6 +1,7 @@
 """The regular grid that carries the field."""
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -29,6 +30,22 @@ class Grid:
         cells = np.rint((x - self.origin) / self.spacing).astype(np.int64)
         return np.ravel_multi_index(np.clip(cells, 0, np.array(self.shape) - 1).T, self.shape)
 
+    def check(self, points: np.ndarray, *shapes: tuple) -> None:
+        """Raise :class:`InputError` where points (n,3) of a surface are not all in the box, or arrays over the nodes
+        have other `shapes`."""
+        low, high = self.origin, self.origin + self.spacing * (np.array(self.shape) - 1)
+        if not ((points >= low) & (points <= high)).all():
+            raise InputError(
+                f"the grid reaches from {low} to {high}, and the surface from {points.min(axis=0)} to "
+                f"{points.max(axis=0)}; give a grid that holds it, as fit_grid does of its points"
+            )
+        for shape in shapes:
+            if shape != self.shape:
+                raise InputError(
+                    f"distances have shape {shape} and the grid {self.shape}; give both values and band as "
+                    "distance_field found them on this grid"
+                )
+
 
 def padding_cells(resolution: int) -> float:
     """Cells that the padding is wide, of a grid with `resolution` cells along its longest side."""
@@ -43,13 +60,13 @@ def node_strides(shape: tuple[int, int, int]) -> np.ndarray:
 def fit_grid(points: np.ndarray, resolution: int) -> Grid:
     """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
     longest side, as many as needed along the others. Raises :class:`InputError` for anything but points (n,3), n >= 1,
-    that are finite and not all in one place, :class:`SettingsError` for less than one cell."""
+    that are finite and not all in one place, :class:`SettingsError` for what is no number of cells from 1 on."""
     points = finite_points(points, least=1)
     low, high = points.min(axis=0), points.max(axis=0)
     if not 0 < (high - low).max() < np.inf:
         raise InputError(f"the points reach from {low} to {high}; a grid needs points that are not all in one place")
-    if not resolution >= 1:
-        raise SettingsError(f"resolution is {resolution}; a grid needs at least 1 cell")
+    if not isinstance(resolution, Real) or not 1 <= resolution < np.inf:
+        raise SettingsError(f"resolution is {resolution!r}; a grid needs a number of cells, at least 1")
     padding = PADDING * (high - low).max()
     sides = high - low + 2 * padding
     spacing = float(sides.max() / resolution)

@@ -29,8 +29,10 @@ def distance_field(
 ) -> tuple[np.ndarray, NearBand]:
     """Unsigned distance at every node of the grid, float32 of its shape, in the units of the samples, and the band
     in which it is known with its direction. Outside the band by `integration`: "transport" or "poisson", the latter
-    with directions by `diffusion`: "kernel" or "grid". Raises :class:`SettingsError` for other words."""
+    with directions by `diffusion`: "kernel" or "grid". Raises :class:`SettingsError` for other words, and
+    :class:`InputError` for a grid that does not hold the surface."""
     Settings(integration=integration, diffusion=diffusion)
+    grid.check(surface.points)
     progress = Progress.of(progress)
     node, near = _projected(surface, grid, progress.part(0.0, 0.6))
     if integration == "poisson":

@@ -13,6 +13,7 @@ from ..neighbourhoods.close_sheets import sheet_room
 from ..neighbourhoods.cloud import Cloud
 from ..normals.known import known_normals
 from ..progress import Progress
+from ..settings import Settings
 from .curvature import bending
 from .grid import Grid
 from .patches import Patches
@@ -92,7 +93,8 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Some may be added beside creases,
     after those given, see :mod:`.rims.line_creases`. Raises :class:`InputError` for other shapes, what is not finite,
     axes without a direction, spacings not above 0, and points that span more or less than single precision holds the
-    fourth powers of."""
+    fourth powers of, :class:`SettingsError` for a bridge outside its limits."""
+    bridge = Settings(bridge=bridge).bridge
     progress, points = Progress.of(progress), finite_points(points, least=2)
     span = float(np.ptp(points, axis=0).max())
     if not _SMALLEST < span < _LARGEST:

@@ -71,8 +71,9 @@ def test_settings_and_errors_alone_need_no_scipy():
 def test_stages_alone_refuse_what_a_run_refuses():
     points = shapes.sphere(300)
     spacing, grid = local_spacing(points), fit_grid(points, 16)
-    with pytest.raises(SettingsError, match="resolution is 0"):
-        fit_grid(points, 0)
+    for resolution in (0, float("nan"), float("inf"), "24"):
+        with pytest.raises(SettingsError, match=f"resolution is {resolution!r}; a grid needs a number of cells"):
+            fit_grid(points, resolution)
     for nothing in ([], "abc", points[:, :2], [[0, 0, 0], [1, 1]], points + 1j):
         with pytest.raises(InputError, match=r"give an \(n,3\) array"):
             fit_grid(nothing, 16)
@@ -99,14 +100,26 @@ def test_stages_alone_refuse_what_a_run_refuses():
     for size in (1e-20, 1e20):
         with pytest.raises(InputError, match=r"the points span .* from 1e-07 to 1e\+10"):
             fit_local_surface(size * points, points, np.ones(300), size * spacing, 3.0)
+    for bridge in (0, -1, 100, float("nan"), float("inf"), "3"):
+        with pytest.raises(SettingsError, match=f"bridge is {bridge!r}; it must be a number from 1.5 to 20.0"):
+            fit_local_surface(points, points, np.ones(300), spacing, bridge)
     surface = fit_local_surface(points.tolist(), points.tolist(), [1] * 300, spacing, 3.0)
     for words in ({"integration": "foo"}, {"integration": "poisson", "diffusion": "foo"}):
         with pytest.raises(SettingsError, match="is 'foo'; choose one of"):
             distance_field(surface, grid, **words)
     values, near = distance_field(surface, grid)
-    for offset in (30, 0, float("nan")):
-        with pytest.raises(SettingsError, match=f"offset is {offset}; it must be above 0 and at most 1.6 cells"):
+    for offset in (30, 0, float("nan"), "1"):
+        with pytest.raises(SettingsError, match=f"offset is {offset!r}; it must be above 0 and at most 1.6 cells"):
             double_cover(values, near, surface, grid, offset)
+    for other in (fit_grid(points + 100, 16), fit_grid(points / 2, 16)):
+        with pytest.raises(InputError, match="give a grid that holds it"):
+            distance_field(surface, other)
+        with pytest.raises(InputError, match="give a grid that holds it"):
+            double_cover(values, near, surface, other, 1)
+    with pytest.raises(InputError, match=r"distances have shape \(17, 17, 17\) and the grid"):
+        double_cover(values, near, surface, fit_grid(points, 24), 1)
+    with pytest.raises(InputError, match=r"distances have shape \(\) and the grid"):
+        double_cover(None, near, surface, grid, 1)
 
 
 @pytest.mark.parametrize("solver", ["reflection", "pca", "energy"])

@@ -1,5 +1,7 @@
 """The double cover: a closed two-sided mesh that hugs the surface from both sides."""
 
+from numbers import Real
+
 import numpy as np
 
 from ...errors import SettingsError
@@ -44,8 +46,8 @@ def level_for(surface: LocalSurface, grid: Grid, offset: float) -> float:
     Raises :class:`SettingsError` for an offset that the box has no room for.
     """
     room = padding_cells(max(grid.shape) - 1)
-    if not 0 < offset <= room:
-        raise SettingsError(f"offset is {offset:g}; it must be above 0 and at most {room:g} cells, the room in the box")
+    if not isinstance(offset, Real) or not 0 < offset <= room:
+        raise SettingsError(f"offset is {offset!r}; it must be above 0 and at most {room:g} cells, the room in the box")
     raised = offset + _RAISED * max(0.0, surface.spacing_in_cells(grid) - SPARSE)
     return max(offset, _CLOSEST, min(raised, _WITHIN * room))
 
@@ -78,9 +80,11 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     flattened against rims, which leaves slivers that are taken out, see :mod:`..meshing.slivers`, and a few faces that
     lie back to front, see :mod:`..meshing.unfolding`.
 
-    Raises :class:`SettingsError` for an offset that the box has no room for, and :class:`MissingDependency` where no
-    library that extracts iso-surfaces is found.
+    Raises :class:`SettingsError` for an offset that the box has no room for, :class:`InputError` for distances of
+    another grid or one that does not hold the surface, and :class:`MissingDependency` where no library that extracts
+    iso-surfaces is found.
     """
+    grid.check(surface.points, np.shape(values), band.shape)
     progress = Progress.of(progress)
     level = np.float32(level_for(surface, grid, offset) * grid.spacing)
     clamped = each(lambda u: np.minimum(u, np.float32(level + CLAMP * grid.spacing)), values)

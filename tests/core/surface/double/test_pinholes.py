@@ -78,7 +78,7 @@ def test_wider_openings_than_are_bridged_stay(bridge, found):
 
 
 def test_a_sheet_without_holes_has_none_although_its_rim_turns():
-    assert len(found_around([], bridge=100.0)[0]) == 0
+    assert len(found_around([], bridge=20.0)[0]) == 0
 
 
 def test_the_mouth_of_a_tube_is_none():
@@ -106,7 +106,7 @@ def test_the_rim_of_a_small_sheet_is_none():
     vertices, faces = iso_surface(GRID, foot)
     step = vertices - foot(vertices)
     past_rim = (np.abs(vertices[:, :2]) > 0.1).any(axis=1)
-    assert len(find_pinholes(vertices, faces, step, past_rim, surface_of(points, 100.0), GRID)) == 0
+    assert len(find_pinholes(vertices, faces, step, past_rim, surface_of(points, 20.0), GRID)) == 0
 
 
 def test_faces_that_turn_one_after_the_other_are_no_loop_unless_they_come_back():

@@ -77,7 +77,7 @@ def test_sheets_that_end_before_their_planes_meet_stay_apart():
     far = np.stack(np.meshgrid(np.arange(3 * CELL, 1, 0.03), np.arange(-0.6, 0.6, 0.03)), axis=2).reshape(-1, 2)
     flat, upright = np.column_stack([far, 0 * far[:, 0]]), np.column_stack([0 * far[:, 0], far[:, ::-1]])
     points, normals = np.concatenate([flat, upright]), np.repeat([UP, RIGHT], len(far), axis=0)
-    surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 1.0)
+    surface = fit_local_surface(points, normals, np.ones(len(points)), local_spacing(points), 1.5)
     vertices, faces = strip((5, 0), (4, 0), (0, 4), (0, 5))
     assert (cells_moved(vertices, faces, np.tile([UP, UP, RIGHT, RIGHT], (ROWS, 1)), surface) == 0).all()
 
