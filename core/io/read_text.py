@@ -89,7 +89,8 @@ def _read(path, wanted=None):
         table = _table(path, lines, chain([first] if first else [], rows), mark, tuple(columns.values()))
     if claimed and sum(claimed) != len(table):
         where = "in its first line" if len(claimed) == 1 else f"in {len(claimed)} blocks"
-        raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(table)} follow; is it cut off?")
+        advice = "is it cut off?" if len(table) < sum(claimed) else "correct that number, or leave out such lines"
+        raise InputError(f"{path} says {sum(claimed)} points {where}, but {len(table)} follow; {advice}")
     attributes = dict(zip(list(columns)[3:], table.T[3:], strict=True))
     if guessed and not (attributes and are_colours(table[:, 3:])):
         attributes, further = {}, []

@@ -225,9 +225,9 @@ def test_a_table_of_words_is_refused(folder):
 
 @pytest.mark.parametrize("count", [0, 1, 3, 10**15])
 def test_a_wrong_count_is_refused(folder, count):
-    assert f"says {count} points in its first line, but 2 follow" in refusal(
-        folder, "scan.pts", f"{count}\n1 2 3\n4 5 6\n"
-    )
+    advice = "is it cut off?" if count > 2 else "correct that number, or leave out such lines"
+    message = refusal(folder, "scan.pts", f"{count}\n1 2 3\n4 5 6\n")
+    assert f"says {count} points in its first line, but 2 follow; {advice}" in message
 
 
 def test_blocks_of_points_are_read_one_after_the_other(folder):
