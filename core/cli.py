@@ -118,13 +118,16 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message):
         raise SettingsError(f"{message}; see {self.prog} --help")
 
+    def spelt(self):
+        """Every option as it is spelt."""
+        return list(self._option_string_actions)
+
 
 def _parsed(arguments):
     """What was given. Raises :class:`SettingsError` for what no option takes, with the option that may be meant."""
     given, unknown = _parser().parse_known_args(arguments)
     if unknown:
-        names = vars(given).keys() - {"scan", "run", "command"}
-        meant = get_close_matches(unknown[0].partition("=")[0], sorted(f"--{name}" for name in names), 1)
+        meant = get_close_matches(unknown[0].partition("=")[0], given.spelt, 1)
         raise SettingsError(
             f"unrecognized: {' '.join(unknown)}{f' (is {meant[0]} meant?)' if meant else ''}; {given.command} takes "
             f"one scan at a time, and the options of {PROGRAM} {given.command} --help"
@@ -150,14 +153,14 @@ def _parser():
     command.add_argument("--gradient", action="store_true", help="also write the grid gradient into SCAN.vdb")
     command.add_argument("--arrays", action="store_true", help="also write SCAN.npz for other programs")
     command.add_argument("--json", action="store_true", help="print the report and the files written as JSON")
-    command.set_defaults(run=_reconstruct, command="reconstruct")
+    command.set_defaults(run=_reconstruct, command="reconstruct", spelt=command.spelt())
 
     text = "say what a scan holds and how large a cell would be"
     command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
     command.add_argument("scan", metavar="SCAN", type=_path, help=formats)
     _add_settings(command, {name: options()[name] for name in ("resolution", "band", "surface")})
     command.add_argument("--json", action="store_true", help="print as JSON")
-    command.set_defaults(run=_info, command="info")
+    command.set_defaults(run=_info, command="info", spelt=command.spelt())
     return parser
 
 
