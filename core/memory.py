@@ -1,7 +1,11 @@
-"""Memory used by this process."""
+"""Memory used by this process, and where it is short."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+_NO_THREAD = "can't start new thread"  # as Python says it
 
 
 def peak_memory_mb() -> float | None:
@@ -18,3 +22,14 @@ def peak_memory_mb() -> float | None:
     import resource
 
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+
+
+@contextmanager
+def starting_threads() -> Iterator[None]:
+    """Within, it is a MemoryError, not a RuntimeError, that no thread can be started: each takes memory of its own."""
+    try:
+        yield
+    except RuntimeError as error:
+        if _NO_THREAD not in str(error):
+            raise
+        raise MemoryError("no further thread can be started") from error

@@ -8,6 +8,7 @@ from contextlib import contextmanager, nullcontext
 from itertools import chain, islice
 from threading import local
 
+from .memory import starting_threads
 from .progress import Progress
 
 _AHEAD = 2  # chunks in work or waiting for it, per core
@@ -51,7 +52,9 @@ def in_order(work: Callable, chunks: Iterable) -> Iterator[tuple]:
             while True:
                 busy = [result for _, result in begun if not result.done()]
                 fresh = min(at_once * _AHEAD - len(busy), at_once * _HELD - len(begun))
-                begun += [(chunk, pool.submit(work, chunk)) for chunk in islice(chunks, fresh)]
+                for chunk in islice(chunks, fresh):
+                    with starting_threads():
+                        begun.append((chunk, pool.submit(work, chunk)))
                 if not begun:
                     return
                 if begun[0][1].done():

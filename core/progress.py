@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .errors import Cancelled
+from .memory import starting_threads
 
 ProgressCallback = Callable[[float, str], bool | None]
 
@@ -92,7 +93,8 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
     so far until that is passed. With a `Progress` or nothing to report to, all is done in the caller's thread.
     """
     if progress is None or isinstance(progress, Progress):
-        return work(Progress.of(progress))
+        with starting_threads():
+            return work(Progress.of(progress))
     reports, cancelled = SimpleQueue(), Event()
 
     def look(*report):
@@ -101,12 +103,14 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
 
     def run():
         try:
-            reports.put(_Outcome(work(Progress(look)), None))
+            with starting_threads():
+                reports.put(_Outcome(work(Progress(look)), None))
         except BaseException as error:  # noqa: BLE001  raised again in the caller's thread
             reports.put(_Outcome(None, error))
 
     thread, last, farthest = Thread(target=run, daemon=True), None, 0.0
-    thread.start()
+    with starting_threads():
+        thread.start()
     try:
         while True:
             with suppress(Empty):

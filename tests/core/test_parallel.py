@@ -152,3 +152,15 @@ def test_what_comes_out_does_not_depend_on_the_number_of_cores(monkeypatch):
             meshes = getattr(other, kind), getattr(found[0], kind)
             assert np.array_equal(*(mesh.vertices for mesh in meshes))
             assert np.array_equal(*(mesh.faces for mesh in meshes))
+
+
+@pytest.mark.parametrize("callback", [None, lambda *_: True])
+def test_where_no_thread_can_be_started_memory_is_short(callback, monkeypatch):
+    def none_left(self):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", none_left)
+    with pytest.raises(MemoryError, match="no further thread can be started"):
+        list(in_order(str, range(9)))
+    with pytest.raises(MemoryError, match="no further thread can be started"):
+        reconstruct(np.random.default_rng(0).normal(size=(50, 3)), Settings(resolution=16), progress=callback)
