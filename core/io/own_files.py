@@ -11,7 +11,10 @@ _START = 1 << 10  # bytes of a .ply or .vdb, that say it
 
 
 def is_own(path: Path) -> bool:
-    """Whether the .ply, .vdb, .npz or .json file `path` was made by this program, by what it holds."""
+    """Whether the .ply, .vdb, .npz or .json file `path` was made by this program, by what it holds. Folders and pipes,
+    which nothing may ever come out of, were not."""
+    if not path.is_file():
+        return False
     if path.suffix == ".json":
         return bool(report_of(path))
     if path.suffix == ".npz":

@@ -26,8 +26,9 @@ def write_report(path: str | os.PathLike, report: dict) -> None:
 
 def report_of(path: str | os.PathLike) -> dict:
     """The report of a scan that was written as the file `path`; empty where there is no such file, or another."""
+    path = Path(path)
     try:
-        report = json.loads(Path(path).read_text("utf-8"))
+        report = json.loads(path.read_text("utf-8")) if path.is_file() else {}  # a pipe would be waited for
     except (OSError, ValueError):
         return {}
     sound = isinstance(report, dict) and report.keys() >= _OF_A_RUN and isinstance(report.get("scan"), str)

@@ -279,6 +279,18 @@ def test_files_that_others_made_stay(capsys, scan, calls, tmp_path, ending):
     assert not calls
 
 
+@pytest.mark.parametrize("ending", ["_double.ply", ".json"])
+@pytest.mark.parametrize("make", [os.mkdir, getattr(os, "mkfifo", os.mkdir)])
+def test_folders_and_pipes_stay(scan, tmp_path, ending, make):
+    path = tmp_path / f"ball{ending}"
+    make(path)
+    command = [sys.executable, "-m", "core", "reconstruct", scan, "-o", str(tmp_path), "--arrays"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=30)
+    assert done.returncode == 2
+    assert f"{path} is there, and was not made by this program" in done.stderr
+    assert path.exists()
+
+
 def test_files_of_others_that_resemble_ours_stay(capsys, scan, calls, tmp_path):
     (tmp_path / "ball.json").write_text('{"scan": "ball.npy", "scanner": "a", "files": ["ball.vdb"]}')
     assert "ball.json is there, and was not made" in refused(capsys, "reconstruct", scan, "-o", tmp_path)
