@@ -2,6 +2,7 @@
 
 import io
 import re
+import warnings
 from codecs import BOM_UTF8
 from pathlib import Path
 
@@ -110,7 +111,8 @@ def _smallest_row(element, layout):
 
 
 def _read_rows(elements, counts, layout, body):
-    """The rows of the last of `elements` and the bytes or text after them, by plyfile, row by row."""
+    """The rows of the last of `elements` and the bytes or text after them, by plyfile, row by row; it warns of lists
+    that are empty in text."""
     elements = [PlyElement(e.name, e.properties, n) for e, n in zip(elements, counts, strict=False)]
     header = PlyData(elements, layout.text, layout.byte_order).header
     if layout.text:
@@ -118,4 +120,6 @@ def _read_rows(elements, counts, layout, body):
         stream = io.StringIO("\n".join([header, *filter(str.strip, lines), ""]))
     else:
         stream = io.BytesIO(header.encode("ascii") + b"\n" + body)
-    return PlyData.read(stream)[elements[-1].name].data, stream.read()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "loadtxt: input contained no data", UserWarning)
+        return PlyData.read(stream)[elements[-1].name].data, stream.read()

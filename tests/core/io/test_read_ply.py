@@ -201,6 +201,14 @@ def test_headers_that_other_programs_read(folder, form, written_as, instead):
     np.testing.assert_array_equal(read_points(written(folder, content.replace(written_as, instead))), points)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("form", FORMATS)
+def test_empty_lists_among_the_vertices_are_nothing_to_warn_of(folder, form):
+    points = np.arange(9.0).reshape(3, 3)
+    content = ply([vertices(points, listed=True)], **FORMATS[form])
+    np.testing.assert_array_equal(read_points(written(folder, content)), points)
+
+
 def test_blank_lines_and_what_is_not_a_number_in_text(folder):
     content = ply([vertices(np.array([[1, 2, 3], [4, 5, 6.5], [7, 8, 9]])), faces(1)], text=True)
     content = content.replace(b"6.5", b"-nan(ind)\n \n").replace(b"7 8", b"1.#QNAN 8")
