@@ -75,7 +75,7 @@ def _records(fields, attributes):
 
 def _column(name, values, count, taken):
     values = np.asarray(values)
-    if name in taken or not _NAME.fullmatch(name):
+    if name in taken or not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
             f"a PLY file cannot have an attribute named {name!r}; choose a name without blanks, in ASCII, other than "
             f"{', '.join(taken)}"

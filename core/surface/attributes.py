@@ -19,8 +19,10 @@ def vertex_attributes(mesh: Mesh, result: Reconstruction, carried: dict | None =
                  vertex gets that of its nearest sample, unchanged; what has one of the two names above gets "scan_" put
                  before its own
 
-    Raises :class:`InputError` for carried values with another number of rows than the input.
+    Raises :class:`InputError` for carried values with another number of rows than the input, and for no mesh.
     """
+    if mesh is None:
+        raise InputError("the mesh is None; give the surface or the sheet of a run whose setting `surface` asks for it")
     nearest = nearest_samples(mesh, result)
     at_samples = sample_attributes(result, carried)
     distance = residuals(mesh, result).astype(np.float32)

@@ -116,6 +116,8 @@ def test_attributes_of_types_that_ply_lacks_are_written_as_others(folder, values
         ("my id", np.zeros(3), "without blanks"),
         ("Größe", np.zeros(3), "in ASCII"),
         ("", np.zeros(3), "named ''"),
+        (3, np.zeros(3), "named 3; choose a name"),
+        (None, np.zeros(3), "named None; choose a name"),
         ("id", np.zeros(2), r"shape \(2,\).*each of 3 rows"),
         ("id", np.zeros((3, 2)), r"shape \(3, 2\)"),
         ("id", np.array(["a", "b", "c"]), "type <U1"),

@@ -42,6 +42,11 @@ def test_what_points_carry_comes_from_the_nearest_sample_by_its_row_in_the_input
     np.testing.assert_array_equal(again["scan_scan_confidence"], colour[row])
 
 
+def test_a_mesh_that_was_not_asked_for_is_refused(sphere_run):
+    with pytest.raises(InputError, match="the mesh is None; give the surface or the sheet of a run whose setting"):
+        vertex_attributes(None, sphere_run)
+
+
 def test_a_row_for_each_point_of_the_input_is_needed(sphere_run):
     for label, shape in ((np.zeros(1499), r"\(1499,\)"), (5, r"\(\)")):
         with pytest.raises(InputError, match=f"'label' has shape {shape}; give one row for each of 1500 points"):
