@@ -150,6 +150,7 @@ def _too_coarse(local, grid):
 
 def _field(surfaces, near, feet, grid, samples, band):
     """The field in the input's units."""
+    near = near.from_nearer()
     near = replace(near, step=near.step * samples.scale)
     origin, cell = samples.to_input_units(grid.origin), grid.spacing * samples.scale
     sdf, scale = "signed" in surfaces.meshes, np.float32(samples.scale)

@@ -128,5 +128,5 @@ class BandedField(_OnGrid):
         out = np.flatnonzero((np.abs(values) >= _WITHIN * self.band).any(axis=1))
         if len(out):
             inside = found[out] < 0
-            found[out] = np.where(inside, -1, 1) * self.spacing * self.feet.distances(cells[out])
+            found[out] = np.where(inside, -1, 1) * self.spacing * self.feet.nearest(cells[out])[0]
         return found

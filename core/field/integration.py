@@ -35,6 +35,7 @@ def distance_field(
     grid.check(surface.points)
     progress = Progress.of(progress)
     node, near = _projected(surface, grid, progress.part(0.0, 0.6))
+    nearer = None
     if integration == "poisson":
         known = np.full(grid.shape, np.nan)
         known.flat[node] = near.distance
@@ -42,9 +43,11 @@ def distance_field(
         values.flat[node] = near.distance
     else:
         held, feet = settled_feet(surface, grid, node, near, progress.part(0.6, 0.8))
-        values = transport(grid, held, feet, progress.part(0.8, 1.0))
-        values.flat[node] = no_farther_than_feet(near.distance, values.flat[node], grid)
-    return values, NearBand(grid.shape, node, near.step, near.past_rim, near.sample)
+        values, number = transport(grid, held, feet, progress.part(0.8, 1.0))
+        found = values.flat[node], number.flat[node]
+        nearer = no_farther_than_feet(near, node, feet, found, grid)
+        values.flat[node] = near.distance
+    return values, NearBand(grid.shape, node, near.step, near.past_rim, near.sample, nearer)
 
 
 def near_band(surface: LocalSurface, grid: Grid, progress=None) -> NearBand:

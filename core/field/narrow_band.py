@@ -35,12 +35,15 @@ def banded_field(surface: LocalSurface, grid: Grid, width: float, progress=None)
     node, near = _projected(surface, groups, progress.part(0.1, 0.6))
     feet = _feet(surface, grid, node, near, progress.part(0.6, 0.75))
     block = np.unique(np.ravel_multi_index(tuple((groups.corner // SIDE).T), table_shape(grid.shape)))
-    values = blocks_of(grid.shape, block, np.float32(width * grid.spacing))
+    values, nearer = blocks_of(grid.shape, block, np.float32(width * grid.spacing)), []
     for rows in progress.part(0.75, 0.8).chunks(len(node), _PIECE):
-        to_feet = feet.distances(grid.positions(node[rows]) - grid.origin)
-        values.put(node[rows], no_farther_than_feet(near.distance[rows], to_feet, grid))
+        found = feet.nearest(grid.positions(node[rows]) - grid.origin)
+        row, step = no_farther_than_feet(near[rows], node[rows], feet, found, grid)  # a slice: the distances are these
+        nearer.append((rows.start + row, step))
+        values.put(node[rows], near.distance[rows])
     carried_outwards(values, groups, feet, surface, width, progress.part(0.8, 1.0))
-    return values.merged(), NearBand(grid.shape, node, near.step, near.past_rim, near.sample), feet
+    nearer = tuple(map(np.concatenate, zip(*nearer, strict=True))) or None
+    return values.merged(), NearBand(grid.shape, node, near.step, near.past_rim, near.sample, nearer), feet
 
 
 def trimmed(values: Blocks, band: float) -> Blocks:

@@ -1,6 +1,6 @@
 """Steps from the surface to the nodes next to it: there not only the distance is known but also the way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,11 +59,24 @@ class NearBand(NodeSet):
     step     : (b,3) float64, from the foot point to the node
     past_rim : (b,) bool, whether the foot point lies on a rim of the sheet, where `step` is no normal
     sample   : (b,) int32, the sample nearest to the node
+    nearer   : rows (c,) of nodes that have a foot clearly closer than that, between patches that do not quite meet, and
+               the steps from those (c,3) float64; None where nobody looked
     """
 
     step: np.ndarray
     past_rim: np.ndarray
     sample: np.ndarray
+    nearer: tuple[np.ndarray, np.ndarray] | None = None
+
+    def from_nearer(self) -> "NearBand":
+        """The same with the steps from the closer feet, which are as long as the distances. Meshes do without: such
+        steps turn from node to node, and the single layer of the tests' bust has a hole more by them."""
+        if self.nearer is None:
+            return self
+        row, step = self.nearer
+        steps = self.step.copy()
+        steps[row] = step
+        return replace(self, step=steps, nearer=None)
 
     def whole_cells(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of the cells whose lowest nodes have these rows (m,), or -1, those with all eight corners in the band: their

@@ -27,9 +27,9 @@ _SLAB = 1 << 17  # nodes
 _PIECE = 1 << 15  # blocks
 
 
-def transport(grid: Grid, node: np.ndarray, feet: Feet, progress=None) -> np.ndarray:
+def transport(grid: Grid, node: np.ndarray, feet: Feet, progress=None) -> tuple[np.ndarray, np.ndarray]:
     """Distances at all nodes of the grid, float32 of its shape, from the feet that some nodes (s,) have, by their flat
-    indices in ascending order."""
+    indices in ascending order; and which foot that is, int32."""
     grid = replace(grid, origin=np.zeros(3))  # the feet are relative to it
     progress, slabs = Progress.of(progress), _slabs(grid, _SLAB)
     row = _close_feet(grid, node, feet, progress.part(0.0, 0.8))
@@ -39,7 +39,7 @@ def transport(grid: Grid, node: np.ndarray, feet: Feet, progress=None) -> np.nda
         values[slab] = feet.distance(_positions(grid, slab), row[slab])
 
     work_through(measure, progress.part(0.8, 1.0).each(slabs))
-    return values
+    return values, row
 
 
 def _close_feet(grid, node, feet, progress):

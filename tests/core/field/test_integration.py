@@ -161,7 +161,7 @@ class TestAlone:
         values, near = distance_field(surface, grid)
         projected = surface.project(grid.positions(near.node), nearest=FROM_NODES)
         _, feet = settled_feet(surface, grid, near.node, projected, Progress())
-        found, bound = values.flat[near.node], feet.distances(grid.positions(near.node) - grid.origin)
+        found, bound = values.flat[near.node], feet.nearest(grid.positions(near.node) - grid.origin)[0]
         away = found > 0.7 * grid.spacing
         assert ((found - bound)[away] < 0.2 * grid.spacing).all()
         assert ((projected.distance - bound)[away] > 0.3 * grid.spacing).sum() > 20
@@ -173,6 +173,19 @@ class TestAlone:
         assert 0 <= seen[0] <= seen[-1] <= 1
         with pytest.raises(Cancelled):
             distance_field(*stage, progress=lambda fraction, _: fraction < seen[-1])
+
+
+@pytest.mark.parametrize("band", [None, 4])
+def test_steps_from_the_surface_are_as_long_as_the_distances(band):
+    """Between patches that do not quite meet, too, where those of projections are longer."""
+    points = np.random.default_rng(1).normal(size=(600, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    field = reconstruct(points, Settings(resolution=64, band=band, surface="none")).field
+    x = field.origin + field.spacing * np.stack(np.unravel_index(field.near.node, field.shape), axis=1)
+    values = field.values.flat[field.near.node]
+    np.testing.assert_allclose(np.linalg.norm(field.near.step, axis=1), values, atol=1e-3 * field.spacing)
+    np.testing.assert_allclose(field.sample(x), values, atol=1e-3 * field.spacing)
+    assert np.abs(shapes.sphere_distance(x - field.near.step)).max() < field.spacing
 
 
 @pytest.mark.parametrize("diffusion", ["kernel", "grid"])
