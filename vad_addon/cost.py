@@ -105,7 +105,7 @@ class VAD_OT_estimate(bpy.types.Operator):
         global _asked
         try:
             stored = context.scene.vad
-            source = points_in.gather(points_in.sources(context), context, stored.selected_only)
+            source = points_in.selected(context, stored.selected_only)
             with percentage(context.window_manager) as progress:
                 _asked = _selected(context), Points.of(source.points, stored.outliers, progress)
             _told.clear()

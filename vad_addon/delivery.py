@@ -11,7 +11,7 @@ from ..core.errors import VADError
 from . import attributes, datablocks, materials, overlay, results, shapes, stored_field, volume_files
 from .attributes import Attribute
 from .outcome import Outcome
-from .points_in import Source, object_of
+from .points_in import Source, objects_of
 
 _OWN = {"normal", "confidence", "distance", "moved", "radius"}  # attributes that results set themselves
 
@@ -25,8 +25,8 @@ def deliver(
 ) -> bpy.types.Collection:
     """Put the outcome into a collection "`name` VAD" of `scene`: meshes, samples and volume, all or nothing.
 
-    Where this source has results from an earlier run, these are updated (those in `collection` where it is given), and
-    the objects keep the materials and the modifiers that the user gave them; `keep_both` makes a second collection
+    Where just these objects have results from an earlier run, these are updated (those in `collection` where it is
+    given), and keep the materials and the modifiers that the user gave them; `keep_both` makes a second collection
     instead.
     The field stays as it is where the outcome is made from its file.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
@@ -34,10 +34,9 @@ def deliver(
     other results are delivered.
     The collection carries the run's report as JSON in its custom property ``vad_report``; see also :mod:`results`.
     """
-    origin = object_of(source)
-    warnings = list(outcome.warnings)
+    warnings = [*source.warnings, *outcome.warnings]
     if collection is None and not keep_both:
-        collection = results.previous(scene, origin)
+        collection = results.previous(scene, objects_of(source))
     if collection is not None and results.are_edited(collection.objects):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
@@ -50,9 +49,10 @@ def deliver(
         if collection is None:
             collection = bpy.data.collections.new(f"{source.name} VAD")
             scene.collection.children.link(collection)
+            results.note_sources(collection, objects_of(source))
         rollback.pop_all()
     before, mesh = set(collection.objects), results.mesh(collection)
-    turned = results.note_turn(collection, origin)
+    turned = results.note_turn(collection)
     looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
     for role in roles:
         _place(collection, role, made.get(role), outcome.origin, turned)
@@ -66,8 +66,6 @@ def deliver(
     if results.member(collection, results.FIELD) is not None:
         made_from = overlay.samples_of(made[results.SAMPLES])[:3]
         collection[results.FIELD_OF] = stored_field.identity(*made_from, json.loads(outcome.report)["settings"])
-    if origin is not None:
-        collection[results.SOURCE] = origin
     collection[results.REPORT] = outcome.report
     collection[results.SUMMARY] = "\n".join(_summary(outcome))
     collection[results.WARNINGS] = "\n".join(warnings)

@@ -17,7 +17,7 @@ def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
         for collection in obj.users_collection:
             if results.REPORT in collection:
                 return collection
-        if made := results.previous(context.scene, obj):
+        if made := results.previous(context.scene, points_in.sources(context)):
             return made
     return context.scene.vad.result
 
@@ -148,11 +148,13 @@ class VAD_OT_show(bpy.types.Operator):
 
     def execute(self, context):
         collection = chosen_result(context)
-        obj = results.shown_as(collection, self.role)
-        if obj is None:
+        objects = results.shown_as(collection, self.role)
+        if not objects:
             self.report({"ERROR"}, f"{collection.name} has no {self.role}: it was deleted, or not asked for")
             return {"CANCELLED"}
-        results.show(context.scene, obj, obj.hide_get())
+        shown = any(obj.hide_get() for obj in objects)
+        for obj in objects:
+            results.show(context.scene, obj, shown)
         return {"FINISHED"}
 
 

@@ -21,8 +21,7 @@ class VAD_OT_reconstruct(run.Run, bpy.types.Operator):
     def prepare(self, context):
         options = chosen(context.scene.vad, self.properties)
         self._keep_both = options["keep_both"]
-        self._objects = [obj.session_uid for obj in points_in.sources(context)]
-        self._source = points_in.gather(points_in.sources(context), context, options["selected_only"])
+        self._source = points_in.selected(context, options["selected_only"])
         settings = settings_from(context.scene.vad, self.properties)
         return Task(self._source.points, settings, self._source.constraints)
 
@@ -31,7 +30,7 @@ class VAD_OT_reconstruct(run.Run, bpy.types.Operator):
         collection = deliver(scene, self._source, found, self._keep_both)
         mesh = results.mesh(collection)
         if mesh is not None and collection not in known and not bpy.app.background:
-            results.take_the_stage(context, mesh, self._objects)
+            results.take_the_stage(context, mesh, self._source.uids)
         report_run(self, collection)
 
 

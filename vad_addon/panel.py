@@ -6,7 +6,7 @@ from ..core.settings import options
 from . import cost, extras, job, results, shapes, stages, status
 from .message import draw_message
 from .operators import VAD_OT_cancel, VAD_OT_reconstruct
-from .points_in import point_count, selection_problem, sources
+from .points_in import missing, point_count, selection_problem, sources
 from .presets import VAD_PT_presets
 
 MAIN_SETTINGS = ("resolution", "bridge", "offset")
@@ -41,8 +41,10 @@ class VAD_PT_reconstruct(_Sidebar, bpy.types.Panel):
             name = objects[0].name if len(objects) == 1 else f"{len(objects)} objects"
             icon = f"OUTLINER_OB_{objects[0].type}"
             layout.label(text=f"{name}: {point_count(objects, context):,} points", icon=icon)
+        if lost := missing(context):
+            draw_message(layout, lost, "ERROR")
         extra = ["selected_only"] if any(obj.mode == "EDIT" for obj in objects) else []
-        again = results.previous(context.scene, objects[0]) if objects else None
+        again = results.previous(context.scene, objects)
         _settings_column(layout, stored, [*extra, *MAIN_SETTINGS, *(["keep_both"] if again else [])])
         row = layout.row()
         row.scale_y = 1.5
@@ -97,9 +99,9 @@ class VAD_PT_look(_Sidebar, bpy.types.Panel):
         collection, layer = extras.chosen_result(context), context.view_layer
         row = self.layout.row(align=True)
         for role, name, _ in results.SHOWN:
-            obj = results.shown_as(collection, role)
-            if obj is not None and obj.name in layer.objects:
-                shown = not obj.hide_get()
+            objects = [obj for obj in results.shown_as(collection, role) if obj.name in layer.objects]
+            if objects:
+                shown = not any(obj.hide_get() for obj in objects)
                 row.operator(extras.VAD_OT_show.bl_idname, text=name, depress=shown).role = role
         self.layout.operator(stages.VAD_OT_reextract.bl_idname, icon="FILE_REFRESH")
         column = self.layout.column(align=True)

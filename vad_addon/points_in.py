@@ -1,6 +1,6 @@
 """From Blender's objects to plain points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bmesh
 import bpy
@@ -19,22 +19,25 @@ class Source:
     """Points copied out of Blender, which may do with the objects what it likes from then on.
 
     name        : of the first object
-    uid         : `session_uid` of the first object
+    uids        : `session_uid` of each object
     points      : (n,3) float64, world space
     attributes  : what the points carry, colours for instance
     constraints : (indices (k,), axes (k,3) in world space), or None
+    warnings    : what is missing, one line each
     """
 
     name: str
-    uid: int
+    uids: tuple[int, ...]
     points: np.ndarray
     attributes: dict[str, Attribute]
     constraints: tuple[np.ndarray, np.ndarray] | None
+    warnings: tuple[str, ...] = ()
 
 
-def object_of(source: Source) -> bpy.types.Object | None:
-    """The first object that the points came from, as long as it exists."""
-    return next((obj for obj in bpy.data.objects if obj.session_uid == source.uid), None)
+def objects_of(source: Source) -> list[bpy.types.Object]:
+    """The objects that the points came from, as far as they exist."""
+    found = {obj.session_uid: obj for obj in bpy.data.objects}
+    return [found[uid] for uid in source.uids if uid in found]
 
 
 def active_object(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -53,8 +56,26 @@ def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
         chosen = [active]
     if scans := [obj for obj in chosen if obj.type in READABLE and results.role(obj) is None]:
         return scans
-    origins = [results.origin(obj, context.scene) or obj for obj in chosen[:1]]
+    origins = [source for obj in chosen[:1] for source in results.origins(obj, context.scene) or [obj]]
     return [obj for obj in origins if obj.type in READABLE]
+
+
+def missing(context: bpy.types.Context) -> str:
+    """What is gone of the objects that :func:`sources` were joined with before, one line; empty where none is."""
+    active, there = active_object(context), sources(context)
+    if active is None or there != results.origins(active, context.scene) or not there:
+        return ""
+    names = results.gone(active, context.scene)
+    if not names:
+        return ""
+    left = ", ".join(obj.name for obj in there)
+    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} gone: the run is on {left} alone"
+
+
+def selected(context: bpy.types.Context, selected_only: bool = False) -> Source:
+    """The points of :func:`sources`, by :func:`gather`."""
+    found, lost = gather(sources(context), context, selected_only), missing(context)
+    return replace(found, warnings=(lost,)) if lost else found
 
 
 def selection_problem(context: bpy.types.Context) -> str:
@@ -102,7 +123,8 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
     joined = attributes.join([(len(points), carried) for points, carried in clouds])
     axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
     fixed = np.flatnonzero(axes.any(axis=1))
-    return Source(objects[0].name, objects[0].session_uid, points, joined, (fixed, axes[fixed]) if len(fixed) else None)
+    uids, constraints = tuple(obj.session_uid for obj in objects), (fixed, axes[fixed]) if len(fixed) else None
+    return Source(objects[0].name, uids, points, joined, constraints)
 
 
 def point_count(objects: list[bpy.types.Object], context: bpy.types.Context) -> int:

@@ -1,5 +1,7 @@
 """How the results of a run are found again: custom properties on its collection and its objects."""
 
+import json
+
 import bpy
 from bpy.app.handlers import persistent
 from mathutils import Matrix
@@ -8,9 +10,11 @@ ROLE, ORIGIN = "vad_role", "vad_origin"  # of an object; the second is the place
 BOX = "vad_box"  # of an object: number of its points and the corners of their box, as they were made
 SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 MESHES = SURFACE, SHEET
-ESTIMATE = "estimate"  # samples with normals alone, made without a run; its SOURCE is its own property
-SOURCE, REPORT, SUMMARY, WARNINGS = "vad_source", "vad_report", "vad_summary", "vad_warnings"  # of a collection
-TURN = "vad_turn"  # of a collection and of an estimate: rotation and scale of the source, row by row
+ESTIMATE = "estimate"  # samples with normals alone, made without a run; the sources are its own properties
+REPORT, SUMMARY, WARNINGS = "vad_report", "vad_summary", "vad_warnings"  # of a collection
+SOURCE, JOINED = "vad_source", "vad_joined"  # of a collection and of an estimate: first source, the others by number
+NAMES = "vad_names"  # of the same: what the sources were called, in JSON
+TURN = "vad_turn"  # of the same: rotation and scale of the sources, row by row
 _TYPES = {SAMPLES: "POINTCLOUD", SURFACE: "MESH", SHEET: "MESH", FIELD: "VOLUME", ESTIMATE: "POINTCLOUD"}
 FIELD_OF = "vad_field_of"  # of a collection: :func:`stored_field.identity` of what its field was made from
 
@@ -34,9 +38,9 @@ def member(collection: bpy.types.Collection, wanted: str) -> bpy.types.Object | 
     return next((obj for obj in collection.objects if role(obj) == wanted), None)
 
 
-def shown_as(collection: bpy.types.Collection, name: str) -> bpy.types.Object | None:
-    """The object that one of SHOWN stands for."""
-    return member(collection, name) if name in ROLES else collection.get(SOURCE)
+def shown_as(collection: bpy.types.Collection, name: str) -> list[bpy.types.Object]:
+    """The objects that one of SHOWN stands for."""
+    return [obj for obj in ([member(collection, name)] if name in ROLES else sources(collection)) if obj is not None]
 
 
 def mesh(collection: bpy.types.Collection) -> bpy.types.Object | None:
@@ -44,26 +48,51 @@ def mesh(collection: bpy.types.Collection) -> bpy.types.Object | None:
     return next((obj for obj in (member(collection, role) for role in MESHES) if obj), None)
 
 
-def origin(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """What the result `obj` was made from, as long as that is in the scene."""
-    if role(obj) is None:
-        return None
-    made_from = (holder.get(SOURCE) for holder in (obj, *obj.users_collection))
-    return next((source for source in made_from if source and source.name in scene.objects), None)
+def note_sources(holder: bpy.types.ID, objects: list[bpy.types.Object]) -> None:
+    """Let `holder`, the collection of a run or an estimate, know what it was made from."""
+    if objects:
+        holder[SOURCE], holder[JOINED] = objects[0], {str(k): obj for k, obj in enumerate(objects[1:], start=1)}
+        holder[NAMES] = json.dumps([obj.name for obj in objects])
 
 
-def estimate(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.types.Object | None:
-    """The normals alone that were found of `source`, unless they are being edited or not of this .blend."""
-    found = (obj for obj in scene.objects if source is not None and role(obj) == ESTIMATE and obj.get(SOURCE) == source)
+def sources(holder: bpy.types.ID) -> list[bpy.types.Object | None]:
+    """What `holder` was made from, several objects where these were joined; None in place of what is gone."""
+    return [holder.get(SOURCE), *(holder[JOINED].get(str(k)) for k in range(1, len(_names(holder))))]
+
+
+def _names(holder):
+    return json.loads(holder.get(NAMES, "[]"))
+
+
+def _holder(obj):
+    """What knows what the result `obj` was made from: itself or its collection."""
+    return next((one for one in (obj, *obj.users_collection) if SOURCE in one or NAMES in one), obj)
+
+
+def origins(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """What the result `obj` was made from, as far as that is in the scene."""
+    made_from = sources(_holder(obj)) if role(obj) is not None else []
+    return [source for source in made_from if source is not None and source.name in scene.objects]
+
+
+def gone(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
+    """Names of what the result `obj` was made from and what is not in the scene any more."""
+    holder, there = _holder(obj), origins(obj, scene)
+    return [name for name, source in zip(_names(holder), sources(holder), strict=False) if source not in there]
+
+
+def estimate(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bpy.types.Object | None:
+    """The normals alone that were found of just these objects, unless they are being edited or not of this .blend."""
+    found = (obj for obj in scene.objects if role(obj) == ESTIMATE and set(sources(obj)) == set(objects))
     return next((obj for obj in found if _is_own(obj) and not are_edited([obj])), None)
 
 
-def previous(scene: bpy.types.Scene, source: bpy.types.Object | None) -> bpy.types.Collection | None:
-    """The results that an earlier run made of `source` in this scene; the latest where several were kept."""
+def previous(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bpy.types.Collection | None:
+    """The results that an earlier run made of just these objects in this scene; the latest where several were kept."""
     made = [
         collection
         for collection in scene.collection.children_recursive
-        if source is not None and collection.get(SOURCE) == source and can_be_updated(collection)
+        if set(sources(collection)) == set(objects) and can_be_updated(collection)
     ]
     return scene.vad.result if scene.vad.result in made else (made or [None])[-1]
 
@@ -101,13 +130,12 @@ def place(obj: bpy.types.Object, origin, turned: bool) -> None:
     obj.matrix_world = matrix
 
 
-def note_turn(holder: bpy.types.ID, source: bpy.types.Object | None) -> bool:
-    """Whether the source of the results that `holder` is, or holds, was turned or scaled since this was called last."""
-    if source is None:
-        return False
-    before, now = list(holder.get(TURN, ())), [x for row in source.matrix_world.to_3x3() for x in row]
+def note_turn(holder: bpy.types.ID) -> bool:
+    """Whether a source of the results that `holder` is, or holds, was turned or scaled since this was called last."""
+    before, there = list(holder.get(TURN, ())), [source for source in sources(holder) if source is not None]
+    now = [x for source in there for row in source.matrix_world.to_3x3() for x in row]
     holder[TURN] = now
-    return before not in ([], now)
+    return len(before) == len(now) and before != now
 
 
 def summary(collection: bpy.types.Collection) -> list[str]:
@@ -150,13 +178,15 @@ def leave_modes(context: bpy.types.Context) -> None:
 @persistent
 def forget_deleted(*_) -> None:
     """Before a save: what was deleted is not kept, and saved, for the results that were made of it."""
-    for holder in (*bpy.data.collections, *bpy.data.objects):
-        source = holder.get(SOURCE)
-        if source is not None and is_editable(holder) and not source.users_collection:
-            del holder[SOURCE]
+    for holder in filter(is_editable, (*bpy.data.collections, *bpy.data.objects)):
+        for pointers in (holder, holder.get(JOINED) or {}):
+            for name in [SOURCE] if pointers is holder else list(pointers.keys()):
+                obj = pointers.get(name)
+                if obj is not None and not obj.users_collection:
+                    del pointers[name]
 
 
-def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: list[int]) -> None:
+def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: tuple[int, ...]) -> None:
     """Make `obj` the active object and hide what it was made from (`uids`: the objects' `session_uid`), as those points
     would cover it, with the normals found for them before.
 
@@ -164,14 +194,14 @@ def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: list
     """
     layer = context.view_layer
     layer.update()
-    sources = [source for source in layer.objects if source.session_uid in uids]
+    made_from = {source for source in layer.objects if source.session_uid in uids}
     active = layer.objects.active
-    made_from = active and (origin(active, context.scene) or active)
-    if obj.name not in layer.objects or context.mode != "OBJECT" or made_from not in sources:
+    looked_at = {active, *(origins(active, context.scene) if active else ())}
+    if obj.name not in layer.objects or context.mode != "OBJECT" or not looked_at & made_from:
         return
     for other in layer.objects:
         other.select_set(False)
-        if other in sources or (role(other) == ESTIMATE and other.get(SOURCE) in sources):
+        if other in made_from or (role(other) == ESTIMATE and set(sources(other)) <= made_from):
             show(context.scene, other, False)
     layer.objects.active = obj
     obj.select_set(True)

@@ -39,7 +39,7 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         return len(task.points) <= 3000
 
     def prepare(self, context):
-        self._objects, self._source = _selected(context)
+        self._source = points_in.selected(context, context.scene.vad.selected_only)
         stored = context.scene.vad
         if not self.properties.is_property_set("strength") and settings_from(stored).denoise not in {"auto", 0.0}:
             self.strength = settings_from(stored).denoise
@@ -58,7 +58,9 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
             carried[AXIS] = Attribute.of(axes[rows])
         cloud = datablocks.pointcloud_data(f"{source.name} cleaned", found.points, found.origin, carried)
         obj = _placed(context, scene, source, cloud, found.origin)
-        results.take_the_stage(context, obj, self._objects)
+        results.take_the_stage(context, obj, source.uids)
+        for warning in source.warnings:
+            self.report({"WARNING"}, warning)
         dropped = json.loads(found.report)["cleaning"]["outliers"]
         facts = f"{len(rows):,} points, {dropped:,} strays dropped, moved by {moved.mean():.3g} on average"
         self.report({"INFO"}, f"{obj.name}: {facts}")
@@ -79,7 +81,7 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
         return len(task.points) <= 10_000 and self.solver != "energy"
 
     def prepare(self, context):
-        _, self._source = _selected(context)
+        self._source = points_in.selected(context, context.scene.vad.selected_only)
         stored = context.scene.vad
         settings = settings_from(stored, **taken_over(stored, self.properties, self.__annotations__))
         return Task(self._source.points, settings, self._source.constraints, until=NORMALS)
@@ -88,20 +90,19 @@ class VAD_OT_normals(run.Run, bpy.types.Operator):
         source = self._source
         carried, own = of_samples(source, found)
         cloud = datablocks.pointcloud_data(f"{source.name} normals", found.points, found.origin, carried | own)
-        origin = points_in.object_of(source)
-        obj = results.estimate(scene, origin)
+        made_from = points_in.objects_of(source)
+        obj = results.estimate(scene, made_from)
         if obj is None:
             obj = _placed(context, scene, source, cloud, found.origin)
             obj[results.ROLE] = results.ESTIMATE
-            if origin is not None:
-                obj[results.SOURCE] = origin
-                results.note_turn(obj, origin)
+            results.note_sources(obj, made_from)
+            results.note_turn(obj)
         else:
             datablocks.replace_data(obj.data, cloud)
-            results.place(obj, found.origin, results.note_turn(obj, origin))
+            results.place(obj, found.origin, results.note_turn(obj))
         if not bpy.app.background:
             scene.vad.overlay.show = True
-        for warning in found.warnings:
+        for warning in (*source.warnings, *found.warnings):
             self.report({"WARNING"}, warning)
         unsure = int((found.confidence < 0.5).sum())
         self.report({"INFO"}, f"{obj.name}: {len(found.points):,} normals, {unsure:,} of them unsure")
@@ -142,9 +143,10 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         near, axes, confidence, _ = overlay.samples_of(samples.data)
         centre = np.array(samples[results.ORIGIN])
         points = points_in.in_world(near, samples) if moved_within(samples) else near.astype(np.float64) + centre
-        made_from = collection.get(results.SOURCE)
-        name, uid = (made_from.name, made_from.session_uid) if made_from else (samples.name.removesuffix(" samples"), 0)
-        self._source = Source(name, uid, points, attributes.read(samples.data), None)
+        made_from = [source for source in results.sources(collection) if source is not None]
+        name = made_from[0].name if made_from else samples.name.removesuffix(" samples")
+        uids = tuple(source.session_uid for source in made_from)
+        self._source = Source(name, uids, points, attributes.read(samples.data), None)
         self._collection = collection.session_uid if results.can_be_updated(collection) else None
         field, volume = results.member(collection, results.FIELD), None
         same = collection.get(results.FIELD_OF) == stored_field.identity(near, axes, confidence, asdict(settings))
@@ -159,19 +161,13 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         report_run(self, deliver(scene, self._source, found, collection=collection))
 
 
-def _selected(context):
-    """What is selected: the objects' `session_uid`, and their points."""
-    objects = points_in.sources(context)
-    return [obj.session_uid for obj in objects], points_in.gather(objects, context, context.scene.vad.selected_only)
-
-
 def _placed(context, scene, source, data, origin):
-    """A new object, beside the one that its points come from where that is shown."""
+    """A new object, beside the first that its points come from where that is shown."""
     obj = bpy.data.objects.new(data.name, data)
     obj.location = origin
-    beside = points_in.object_of(source)
     layer = context.view_layer if context.scene == scene else scene.view_layers[0]
-    homes = [home for home in beside.users_collection if results.is_in(home, layer)] if beside else []
+    beside = [home for made_from in points_in.objects_of(source)[:1] for home in made_from.users_collection]
+    homes = [home for home in beside if results.is_in(home, layer)]
     results.home(homes, scene).objects.link(obj)
     return obj
 

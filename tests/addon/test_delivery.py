@@ -358,6 +358,78 @@ def test_the_mesh_takes_the_stage_from_all_that_it_was_made_of(blender, run, sca
     assert run(resolution=32) == made
 
 
+@pytest.fixture
+def joined(blender, scan, add_mesh, sphere):
+    """The sphere and a smaller one beside it, both selected."""
+    return scan, add_mesh("Other", 0.5 * sphere + [2, 0, 0])
+
+
+def make_active(bpy, *objects):
+    """Select these objects alone, and make the first the active one."""
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    for obj in objects:
+        obj.hide_set(False)
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def count(made):
+    return len(made["samples"].data.attributes["position"].data)
+
+
+def test_what_was_joined_is_joined_again_from_the_results(blender, run, joined):
+    made = run()
+    make_active(blender, made["surface"])
+    assert run() == made
+    assert count(made) == 1000
+    blender.ops.vad.normals()
+    (alone,) = (obj for obj in blender.data.objects if obj.get("vad_role") == "estimate")
+    make_active(blender, alone)
+    blender.ops.vad.normals()
+    assert len(alone.data.attributes["position"].data) == 1000
+    for hidden in (True, False):
+        blender.ops.vad.show(role="source")
+        assert [obj.hide_get() for obj in joined] == [hidden] * 2
+
+
+def test_a_run_on_some_of_what_was_joined_leaves_the_results_of_all(blender, run, joined):
+    made = run()
+    for obj in joined:
+        make_active(blender, obj)
+        assert not set(run().values()) & set(made.values())
+    assert count(made) == 1000
+    make_active(blender, *joined)
+    assert run() == made
+
+
+@pytest.mark.parametrize("gone", [0, 1])
+def test_what_is_gone_of_what_was_joined_is_said(blender, folder, run, joined, extension, gone):
+    made, name, left = run(), joined[gone].name, joined[1 - gone]
+    make_active(blender, joined[gone])
+    blender.ops.object.delete()
+    make_active(blender, made["surface"])
+    for _ in range(2):
+        again = run()
+        assert count(again) == 500
+        assert count(made) == 1000
+        (warning,) = extension("vad_addon.results").warnings(blender.context.scene.vad.result)
+        assert warning == f"{name} is gone: the run is on {left.name} alone"
+        blender.ops.wm.save_mainfile()
+    blender.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
+    assert name not in blender.data.objects
+
+
+def test_joined_scans_one_of_which_was_turned_take_their_results_along(blender, run, joined):
+    made = run()
+    made["surface"].scale = 2, 2, 2
+    make_active(blender, *reversed(joined))
+    assert tuple(run()["surface"].scale) == (2, 2, 2)
+    joined[1].rotation_euler = 0, 0, 1
+    blender.context.view_layer.update()
+    assert tuple(run()["surface"].scale) == (1, 1, 1)
+
+
 @pytest.mark.parametrize("elsewhere", ["editing", "active"])
 def test_who_went_on_to_something_else_is_not_disturbed(blender, run, scan, add_mesh, sphere, extension, elsewhere):
     made = run()

@@ -145,7 +145,7 @@ def test_selected_objects_are_joined_the_active_one_first(blender, gather, add_m
     other, active = add_mesh("Other", sphere[:100]), add_mesh("Scan", sphere)
     other.location = 5, 0, 0
     found = gather()
-    assert (found.name, found.uid) == ("Scan", active.session_uid)
+    assert (found.name, found.uids) == ("Scan", (active.session_uid, other.session_uid))
     assert_allclose(found.points, np.concatenate([sphere, sphere[:100] + np.array([5, 0, 0])]), atol=1e-6)
     other.select_set(False)
     assert len(gather().points) == 500
@@ -156,7 +156,7 @@ def test_an_active_object_that_is_not_selected_stands_alone(gather, add_mesh, sp
     scan = add_mesh("Scan", sphere)
     scan.select_set(False)
     found = gather()
-    assert (found.uid, len(found.points)) == (scan.session_uid, 500)
+    assert (found.uids, len(found.points)) == ((scan.session_uid,), 500)
 
 
 def test_an_overridden_context_names_the_object(blender, gather, add_mesh, sphere):
@@ -169,22 +169,22 @@ def test_an_overridden_context_names_the_object(blender, gather, add_mesh, spher
 def test_a_selected_camera_does_not_matter(blender, gather, add, add_mesh, sphere):
     scan = add_mesh("Scan", sphere)
     add("Eye", blender.data.cameras.new("Eye"))
-    assert gather().uid == scan.session_uid
+    assert gather().uids == (scan.session_uid,)
 
 
 def test_a_result_stands_for_what_it_was_made_from(blender, gather, add_mesh, sphere):
     scan, result = add_mesh("Scan", sphere), add_mesh("Result", sphere)
     result["vad_role"] = "surface"
-    assert gather().uid == scan.session_uid
+    assert gather().uids == (scan.session_uid,)
     scan.select_set(False)
-    assert gather().uid == result.session_uid  # of a source unknown, or gone
+    assert gather().uids == (result.session_uid,)  # of a source unknown, or gone
 
     made = blender.data.collections.new("Scan VAD")
     made.objects.link(result)
     made["vad_source"] = scan
-    assert gather().uid == scan.session_uid
+    assert gather().uids == (scan.session_uid,)
     blender.data.objects.remove(scan)
-    assert gather().uid == result.session_uid
+    assert gather().uids == (result.session_uid,)
 
 
 @pytest.mark.parametrize("modifier", [False, True])

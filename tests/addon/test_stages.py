@@ -369,7 +369,7 @@ def test_what_is_missing_is_said(blender, scan, add):
 
 @pytest.mark.parametrize("operator", ["denoise", "normals"])
 def test_a_source_deleted_meanwhile_is_survived(blender, scan, extension, monkeypatch, operator):
-    monkeypatch.setattr(extension("vad_addon.points_in"), "object_of", lambda source: None)
+    monkeypatch.setattr(extension("vad_addon.points_in"), "objects_of", lambda source: [])
     assert getattr(blender.ops.vad, operator)() == {"FINISHED"}
     assert len([obj for obj in blender.context.scene.objects if obj.type == "POINTCLOUD"]) == 1
 
