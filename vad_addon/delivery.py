@@ -37,7 +37,7 @@ def deliver(
     warnings = [*source.warnings, *outcome.warnings]
     if collection is None and not keep_both:
         collection = results.previous(scene, objects_of(source))
-    if collection is not None and results.are_edited(collection.objects):
+    if collection is not None and results.are_edited([*collection.objects, *results.members(collection)]):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
     roles, known = results.ROLES, results.member(collection, results.FIELD) if collection is not None else None
@@ -51,7 +51,7 @@ def deliver(
             scene.collection.children.link(collection)
             results.note_sources(collection, objects_of(source))
         rollback.pop_all()
-    before, mesh = set(collection.objects), results.mesh(collection)
+    before, mesh = set(results.members(collection)), results.mesh(collection)
     turned = results.note_turn(collection)
     looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
     for role in roles:
@@ -59,7 +59,7 @@ def deliver(
     stays = before if results.mesh(collection) == mesh else set()
     _show_mesh_first(scene, collection, stays)
     _stay_active(looked_at, results.mesh(collection))
-    _colour(set(collection.objects) - before, source)
+    _colour(set(results.members(collection)) - before, source)
     if results.FIELD in made:
         shapes.follow(collection)
         materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell, outcome.shape)
@@ -139,6 +139,7 @@ def _place(collection, role, data, origin, turned):
     else:
         was_moved = moved_within(obj)
         datablocks.replace_data(obj.data, data)
+    results.hold(collection, obj)
     if was_moved or tuple(obj.get(results.ORIGIN, ())) != tuple(origin):
         obj[results.ORIGIN] = origin
         results.place(obj, origin, turned)

@@ -14,9 +14,8 @@ def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
     """The run whose results are meant: the one the active object belongs to, else the scene's last."""
     obj = points_in.active_object(context)
     if obj is not None:
-        for collection in obj.users_collection:
-            if results.REPORT in collection:
-                return collection
+        if run := results.run_of(obj):
+            return run
         if made := results.previous(context.scene, points_in.sources(context)):
             return made
     return context.scene.vad.result

@@ -15,6 +15,7 @@ REPORT, SUMMARY, WARNINGS = "vad_report", "vad_summary", "vad_warnings"  # of a 
 SOURCE, JOINED = "vad_source", "vad_joined"  # of a collection and of an estimate: first source, the others by number
 NAMES = "vad_names"  # of the same: what the sources were called, in JSON
 TURN = "vad_turn"  # of the same: rotation and scale of the sources, row by row
+MEMBERS = "vad_members"  # of a collection: its results by role, wherever they were moved
 _TYPES = {SAMPLES: "POINTCLOUD", SURFACE: "MESH", SHEET: "MESH", FIELD: "VOLUME", ESTIMATE: "POINTCLOUD"}
 FIELD_OF = "vad_field_of"  # of a collection: :func:`stored_field.identity` of what its field was made from
 
@@ -34,8 +35,32 @@ def role(obj: bpy.types.Object) -> str | None:
 
 
 def member(collection: bpy.types.Collection, wanted: str) -> bpy.types.Object | None:
-    """The object that plays this role in the results of a run."""
-    return next((obj for obj in collection.objects if role(obj) == wanted), None)
+    """The object that plays this role in the results of a run, whatever collection it is in now."""
+    if MEMBERS not in collection:  # of an earlier version
+        return next((obj for obj in collection.objects if role(obj) == wanted), None)
+    obj = collection[MEMBERS].get(wanted)
+    return obj if obj is not None and obj.users_collection and role(obj) == wanted else None
+
+
+def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """The results of a run, those that follow them left out."""
+    return [obj for wanted in ROLES if (obj := member(collection, wanted)) is not None]
+
+
+def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
+    """Make `obj` the one that plays its role in the results of a run."""
+    collection[MEMBERS] = {role(one): one for one in (*members(collection), obj)}
+
+
+def run_of(obj: bpy.types.Object) -> bpy.types.Collection | None:
+    """The collection of the run that `obj` is a result of, wherever it was moved; else the one that it is in; else that
+    of the result that it follows."""
+    homes = [collection for collection in obj.users_collection if REPORT in collection]
+    runs = [collection for collection in (*homes, *bpy.data.collections) if MEMBERS in collection]
+    found = [run for run in runs if role(obj) in ROLES and obj in members(run)] or homes
+    if not found and role(obj) is not None and obj.parent is not None:
+        return run_of(obj.parent)
+    return found[0] if found else None
 
 
 def shown_as(collection: bpy.types.Collection, name: str) -> list[bpy.types.Object]:
@@ -66,7 +91,7 @@ def _names(holder):
 
 def _holder(obj):
     """What knows what the result `obj` was made from: itself or its collection."""
-    return next((one for one in (obj, *obj.users_collection) if SOURCE in one or NAMES in one), obj)
+    return obj if NAMES in obj or SOURCE in obj else run_of(obj) or obj
 
 
 def origins(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -109,7 +134,8 @@ def home(collections, scene: bpy.types.Scene) -> bpy.types.Collection:
 
 def can_be_updated(collection: bpy.types.Collection) -> bool:
     """Whether `collection` and all results in it are of this .blend."""
-    return is_editable(collection) and all(_is_own(obj) for obj in collection.objects if role(obj) is not None)
+    found = (*members(collection), *(obj for obj in collection.objects if role(obj) is not None))
+    return is_editable(collection) and all(map(_is_own, found))
 
 
 def _is_own(obj):
@@ -177,9 +203,10 @@ def leave_modes(context: bpy.types.Context) -> None:
 
 @persistent
 def forget_deleted(*_) -> None:
-    """Before a save: what was deleted is not kept, and saved, for the results that were made of it."""
+    """Before a save: what was deleted is not kept, and saved, for the results that were made of it, or for their
+    run."""
     for holder in filter(is_editable, (*bpy.data.collections, *bpy.data.objects)):
-        for pointers in (holder, holder.get(JOINED) or {}):
+        for pointers in (holder, holder.get(JOINED) or {}, holder.get(MEMBERS) or {}):
             for name in [SOURCE] if pointers is holder else list(pointers.keys()):
                 obj = pointers.get(name)
                 if obj is not None and not obj.users_collection:

@@ -58,8 +58,8 @@ def normals(collection: bpy.types.Collection, length: float, thickness: float, e
 def follow(collection: bpy.types.Collection) -> None:
     """Let shells and slices read the distances of the collection's volume, which signed ones have another name for."""
     field = results.member(collection, results.FIELD)
-    for obj in collection.objects:
-        for modifier in obj.modifiers if field is not None else ():
+    for obj in {*collection.objects, *field.children}:
+        for modifier in obj.modifiers:
             if results.role(obj) == SHELL and modifier.type == "VOLUME_TO_MESH":
                 modifier.grid_name = _distances(field)
             elif results.role(obj) == SLICE and modifier.type == "NODES" and modifier.node_group is not None:

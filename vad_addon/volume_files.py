@@ -106,7 +106,8 @@ def _copy(path, folder):
 def _warn(volume, problem):
     """Show this problem, and no earlier one, with the results that `volume` belongs to."""
     for collection in bpy.data.collections:
-        if results.REPORT in collection and any(obj.data == volume for obj in collection.objects):
+        of_run = *collection.objects, *results.members(collection)
+        if results.REPORT in collection and any(obj.data == volume for obj in of_run):
             others = [line for line in results.warnings(collection) if not line.startswith(_STAYS)]
             collection[results.WARNINGS] = "\n".join([*others, *([problem] if problem else [])])
 

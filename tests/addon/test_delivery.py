@@ -358,6 +358,64 @@ def test_the_mesh_takes_the_stage_from_all_that_it_was_made_of(blender, run, sca
     assert run(resolution=32) == made
 
 
+def move(bpy, *objects):
+    """Into a new collection, as by M."""
+    other = bpy.data.collections.new("Other")
+    bpy.context.scene.collection.children.link(other)
+    for obj in objects:
+        for home in obj.users_collection:
+            home.objects.unlink(obj)
+        other.objects.link(obj)
+
+
+@pytest.mark.parametrize("role", ["surface", "samples", "field"])
+def test_results_that_were_moved_to_another_collection_are_updated(blender, run, scan, extension, role):
+    made, collection = run(), blender.context.scene.vad.result
+    move(blender, made[role])
+    make_active(blender, made[role])
+    assert extension("vad_addon.extras").chosen_result(blender.context) == collection
+    assert blender.ops.vad.reconstruct(resolution=32) == {"FINISHED"}
+    assert blender.context.scene.vad.result == collection
+    assert {obj for obj in blender.data.objects if obj != scan} == set(made.values())
+    assert len(extension("vad_addon.results").members(collection)) == 3
+    blender.ops.vad.show(role=role)
+    assert made[role].hide_get()
+
+
+def test_shells_that_were_moved_to_another_collection_still_follow(blender, run, scan, extension):
+    run()
+    blender.ops.vad.shell()
+    shell, collection = blender.context.active_object, blender.context.scene.vad.result
+    move(blender, shell)
+    assert extension("vad_addon.extras").chosen_result(blender.context) == collection
+    make_active(blender, scan)
+    run(surface="signed")
+    assert shell.modifiers[0].grid_name == "sdf"
+
+
+def test_a_copy_of_a_result_is_the_users_though_the_result_was_deleted(blender, folder, run, scan, extension):
+    surface = run()["surface"]
+    make_active(blender, surface)
+    blender.ops.object.duplicate()
+    copy = blender.context.active_object
+    copy.name, vertices = "Mine", len(copy.data.vertices)
+    make_active(blender, surface)
+    blender.ops.object.delete()
+    make_active(blender, scan)
+    for _ in range(2):
+        assert blender.ops.vad.reconstruct(resolution=32) == {"FINISHED"}
+        assert len(copy.data.vertices) == vertices
+        assert extension("vad_addon.results").mesh(blender.context.scene.vad.result) != copy
+        blender.ops.wm.save_mainfile()
+        new = extension("vad_addon.results").mesh(blender.context.scene.vad.result)
+        make_active(blender, new)
+        blender.ops.object.delete()
+        blender.ops.wm.save_mainfile()
+        make_active(blender, scan)
+    blender.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
+    assert {"Scan", "Mine"} == {obj.name for obj in blender.data.objects if obj.type == "MESH"}
+
+
 @pytest.fixture
 def joined(blender, scan, add_mesh, sphere):
     """The sphere and a smaller one beside it, both selected."""

@@ -181,7 +181,7 @@ def test_a_result_stands_for_what_it_was_made_from(blender, gather, add_mesh, sp
 
     made = blender.data.collections.new("Scan VAD")
     made.objects.link(result)
-    made["vad_source"] = scan
+    made["vad_source"], made["vad_report"] = scan, "{}"
     assert gather().uids == (scan.session_uid,)
     blender.data.objects.remove(scan)
     assert gather().uids == (result.session_uid,)
