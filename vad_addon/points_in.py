@@ -56,7 +56,7 @@ def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
         chosen = [active]
     if scans := [obj for obj in chosen if obj.type in READABLE and results.role(obj) is None]:
         return scans
-    origins = [source for obj in chosen[:1] for source in results.origins(obj, context.scene) or [obj]]
+    origins = [source for obj in chosen[:1] for source in results.origins(obj, context.scene)]
     return [obj for obj in origins if obj.type in READABLE]
 
 
@@ -85,6 +85,9 @@ def selection_problem(context: bpy.types.Context) -> str:
     obj = active_object(context)
     if obj is None:
         return "No active object: select a point cloud or a mesh"
+    if results.role(obj) is not None:
+        again = "" if results.run_of(obj) is None else "press Extract Again for other meshes, or "
+        return f"The scan of {obj.name} is gone, or unknown: {again}select another scan"
     kind = obj.type.replace("_", " ").lower()
     return f"{obj.name} ({kind}) holds no points: select a point cloud or a mesh"
 

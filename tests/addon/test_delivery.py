@@ -382,6 +382,21 @@ def test_results_that_were_moved_to_another_collection_are_updated(blender, run,
     assert made[role].hide_get()
 
 
+@pytest.mark.parametrize("role", ["surface", "samples", "field"])
+def test_a_result_is_no_scan_though_its_own_is_gone(blender, run, scan, role):
+    made, collection = run(), blender.context.scene.vad.result
+    make_active(blender, scan)
+    blender.ops.object.delete()
+    make_active(blender, made[role])
+    before = {obj: obj.data for obj in blender.data.objects}
+    for operator in (blender.ops.vad.reconstruct, blender.ops.vad.normals, blender.ops.vad.denoise):
+        with pytest.raises(RuntimeError, match=f"The scan of Scan {role} is gone, or unknown: press Extract Again"):
+            operator()
+    assert {obj: obj.data for obj in blender.data.objects} == before
+    assert blender.ops.vad.reextract(resolution=16) == {"FINISHED"}
+    assert blender.context.scene.vad.result == collection
+
+
 def test_shells_that_were_moved_to_another_collection_still_follow(blender, run, scan, extension):
     run()
     blender.ops.vad.shell()

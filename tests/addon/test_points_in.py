@@ -172,19 +172,24 @@ def test_a_selected_camera_does_not_matter(blender, gather, add, add_mesh, spher
     assert gather().uids == (scan.session_uid,)
 
 
-def test_a_result_stands_for_what_it_was_made_from(blender, gather, add_mesh, sphere):
+def test_a_result_stands_for_what_it_was_made_from(blender, gather, extension, add_mesh, sphere):
+    points_in = extension("vad_addon.points_in")
     scan, result = add_mesh("Scan", sphere), add_mesh("Result", sphere)
     result["vad_role"] = "surface"
     assert gather().uids == (scan.session_uid,)
     scan.select_set(False)
-    assert gather().uids == (result.session_uid,)  # of a source unknown, or gone
+    assert not points_in.sources(blender.context)
+    problem = points_in.selection_problem(blender.context)
+    assert problem == "The scan of Result is gone, or unknown: select another scan"
 
     made = blender.data.collections.new("Scan VAD")
     made.objects.link(result)
     made["vad_source"], made["vad_report"] = scan, "{}"
     assert gather().uids == (scan.session_uid,)
     blender.data.objects.remove(scan)
-    assert gather().uids == (result.session_uid,)
+    assert not points_in.sources(blender.context)
+    problem = points_in.selection_problem(blender.context)
+    assert problem.endswith(": press Extract Again for other meshes, or select another scan")
 
 
 @pytest.mark.parametrize("modifier", [False, True])
