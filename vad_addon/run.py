@@ -68,7 +68,7 @@ class Run:
         running = self._job
         if job.running() is not running:  # stopped from elsewhere: the Cancel button
             return self._cancelled(context)
-        if event.type == "ESC" and event.value == "PRESS":
+        if event.type == "ESC" and event.value == "PRESS" and not context.screen.is_animation_playing:
             return self._cancelled(context)
         if event.type != "TIMER":
             return {"PASS_THROUGH"}

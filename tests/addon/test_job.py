@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -208,3 +209,15 @@ def test_the_worker_needs_no_blender(extension, start, task, sphere, monkeypatch
     job = start(task(sphere))
     wait(job, ended)
     assert len(job.outcome().points) == 500
+
+
+@pytest.mark.parametrize("playing", [False, True])
+def test_escape_ends_playback_first(extension, monkeypatch, playing):
+    class Running(extension("vad_addon.run").Run):
+        _job = object()
+        _cancelled = staticmethod(lambda context: {"CANCELLED"})
+
+    monkeypatch.setattr(extension("vad_addon.job"), "_running", Running._job)
+    context = SimpleNamespace(screen=SimpleNamespace(is_animation_playing=playing))
+    found = Running().modal(context, SimpleNamespace(type="ESC", value="PRESS"))
+    assert found == ({"PASS_THROUGH"} if playing else {"CANCELLED"})
