@@ -46,26 +46,30 @@ def active_object(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The objects to reconstruct: those selected, the active one first; the active one alone where it is not selected.
-    Where these are results of earlier runs only, what the active one was made from, so that a run can be repeated with
-    its results at hand."""
-    active, chosen = active_object(context), list(context.selected_objects)
-    if active in chosen:
-        chosen.sort(key=lambda obj: obj != active)
-    elif active is not None:
-        chosen = [active]
+    """The objects to reconstruct: those selected, the active one first. Where these are results of earlier runs only,
+    what the first was made from, so that a run can be repeated with its results at hand."""
+    chosen = _chosen(context)
     if scans := [obj for obj in chosen if obj.type in READABLE and results.role(obj) is None]:
         return scans
     origins = [source for obj in chosen[:1] for source in results.origins(obj, context.scene)]
     return [obj for obj in origins if obj.type in READABLE]
 
 
+def _chosen(context):
+    """The objects that are meant: those selected, the active one first. Where that is not selected, it stands alone if
+    nothing that is can be read, or without a window, as scripts set the active object only."""
+    active, chosen = active_object(context), list(context.selected_objects)
+    if active is None or active in chosen:
+        return sorted(chosen, key=lambda obj: obj != active)
+    readable = [obj for obj in chosen if obj.type in READABLE]
+    return readable if readable and (active.type not in READABLE or not bpy.app.background) else [active]
+
+
 def missing(context: bpy.types.Context) -> str:
     """What is gone of the objects that :func:`sources` were joined with before, one line; empty where none is."""
-    active, there = active_object(context), sources(context)
-    if active is None or there != results.origins(active, context.scene) or not there:
-        return ""
-    names = results.gone(active, context.scene)
+    there = sources(context)
+    first = next((obj for obj in _chosen(context) if there and there == results.origins(obj, context.scene)), None)
+    names = results.gone(first, context.scene) if first is not None else []
     if not names:
         return ""
     left = ", ".join(obj.name for obj in there)
@@ -82,7 +86,7 @@ def selection_problem(context: bpy.types.Context) -> str:
     """Why nothing can be reconstructed, one line; empty where something can."""
     if objects := sources(context):
         return next((_is_off(obj) for obj in objects if _geometry(obj, context) is None), "")
-    obj = active_object(context)
+    obj = next(iter(_chosen(context)), None)
     if obj is None:
         return "No active object: select a point cloud or a mesh"
     if results.role(obj) is not None:

@@ -1,5 +1,7 @@
 """Objects become points where NumPy says they are in the world."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -157,6 +159,22 @@ def test_an_active_object_that_is_not_selected_stands_alone(gather, add_mesh, sp
     scan.select_set(False)
     found = gather()
     assert (found.uids, len(found.points)) == ((scan.session_uid,), 500)
+
+
+def test_what_is_selected_counts_where_the_active_object_is_not(
+    blender, gather, extension, monkeypatch, add, add_mesh, sphere
+):
+    scan = add_mesh("Scan", sphere)
+    add("Eye", blender.data.cameras.new("Eye")).select_set(False)
+    assert gather().uids == (scan.session_uid,)
+    other = add_mesh("Other", sphere)
+    other.select_set(False)
+    assert gather().uids == (other.session_uid,)
+    window = SimpleNamespace(app=SimpleNamespace(background=False))
+    monkeypatch.setattr(extension("vad_addon.points_in"), "bpy", window)
+    assert gather().uids == (scan.session_uid,)
+    scan.select_set(False)
+    assert gather().uids == (other.session_uid,)
 
 
 def test_an_overridden_context_names_the_object(blender, gather, add_mesh, sphere):
