@@ -31,20 +31,22 @@ def read(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     return points, axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
-def fix(obj: bpy.types.Object, axes) -> int:
-    """Give the selected vertices of the mesh `obj`, in edit mode, this axis: a function from the coordinates (k,3) to
-    axes (k,3) or one axis (3,), in the object's space. Zeros free them. Returns how many there are."""
+def selected(obj: bpy.types.Object) -> np.ndarray:
+    """Coordinates (k,3) of the selected vertices of the mesh `obj`, in edit mode, in the object's space."""
+    chosen = [vertex.co for vertex in bmesh.from_edit_mesh(obj.data).verts if vertex.select]
+    return np.array(chosen, np.float64).reshape(-1, 3)
+
+
+def fix(obj: bpy.types.Object, axes: np.ndarray) -> None:
+    """Give the selected vertices of the mesh `obj`, in edit mode, these axes (k,3), or all of them one axis (3,), in
+    the object's space. Zeros free them."""
     mesh = bmesh.from_edit_mesh(obj.data)
-    if not any(vertex.select for vertex in mesh.verts):
-        return 0
     layers = mesh.verts.layers.float_vector
     layer = layers.get(AXIS) or layers.new(AXIS)
     chosen = [vertex for vertex in mesh.verts if vertex.select]
-    wanted = axes(np.array([vertex.co for vertex in chosen]))
-    for vertex, axis in zip(chosen, np.broadcast_to(wanted, (len(chosen), 3)), strict=True):
+    for vertex, axis in zip(chosen, np.broadcast_to(axes, (len(chosen), 3)), strict=True):
         vertex[layer] = axis
     bmesh.update_edit_mesh(obj.data, loop_triangles=False, destructive=False)
-    return len(chosen)
 
 
 def of_active(obj: bpy.types.Object) -> np.ndarray:

@@ -1,7 +1,5 @@
 """Operators that are instant: shapes that follow a result, and axes fixed by hand. Their redo panels are live."""
 
-from functools import partial
-
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -167,9 +165,13 @@ class _OfEditedMesh:
 
     def execute(self, context):
         try:
-            count = sum(axes.fix(obj, partial(self.axes, context, obj)) for obj in context.objects_in_mode_unique_data)
+            chosen = {obj: axes.selected(obj) for obj in context.objects_in_mode_unique_data}
+            count = sum(map(len, chosen.values()))
             if not count:
                 raise InputError("0 points are selected: select those whose axis you know")
+            wanted = {obj: self.axes(context, obj, points) for obj, points in chosen.items() if len(points)}
+            for obj, found in wanted.items():
+                axes.fix(obj, found)
         except VADError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -217,7 +219,10 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
         if self.origin == "ACTIVE":
             world = axes.of_active(context.active_object)
         elif self.origin == "CURSOR":
-            world = np.array(context.scene.cursor.location) - points_in.in_world(points, obj)
+            here = points_in.in_world(points, obj)
+            world = np.array(context.scene.cursor.location) - here
+            if np.linalg.norm(world, axis=1).min() <= 1e-6 * np.abs(here).max():  # single precision
+                raise InputError("The 3D cursor lies on a selected point: move it, or deselect that point")
         elif self.origin == "VIEW":
             if context.region_data is None:
                 raise InputError("No view to take the axis from: run this in a 3D viewport, or type the axis")

@@ -290,7 +290,9 @@ def test_an_active_edge_gives_its_direction_though_the_object_is_stretched(blend
     assert_allclose(np.abs(axes @ way), 1, atol=1e-6)
 
 
-def test_the_axis_of_the_active_element_holds_for_all_meshes_that_are_edited(blender, extension, edited, add_mesh):
+@pytest.fixture
+def both_edited(blender, edited, add_mesh):
+    """The sphere and another mesh, turned, in edit mode, with three points of each selected."""
     import bmesh
 
     blender.ops.object.mode_set(mode="OBJECT")
@@ -302,7 +304,23 @@ def test_the_axis_of_the_active_element_holds_for_all_meshes_that_are_edited(ble
     for obj in (edited, other):
         for vertex in bmesh.from_edit_mesh(obj.data).verts:
             vertex.select = vertex.index < 3
-    way = active_edge(edited)
+    return edited, other
+
+
+def test_a_cursor_on_a_point_is_told_and_nothing_is_fixed(blender, extension, both_edited):
+    import bmesh
+
+    for obj in both_edited:
+        mesh = bmesh.from_edit_mesh(obj.data)
+        mesh.verts.ensure_lookup_table()
+        blender.context.scene.cursor.location = obj.matrix_world @ mesh.verts[0].co
+        with pytest.raises(RuntimeError, match="The 3D cursor lies on a selected point: move it, or deselect that"):
+            blender.ops.vad.fix_axes(origin="CURSOR")
+        assert constraints(blender, extension) is None
+
+
+def test_the_axis_of_the_active_element_holds_for_all_meshes_that_are_edited(blender, extension, both_edited):
+    way = active_edge(both_edited[0])
     blender.ops.vad.fix_axes(origin="ACTIVE")
     indices, axes = constraints(blender, extension)
     assert indices == [0, 1, 2, 500, 501, 502]
