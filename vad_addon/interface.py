@@ -57,10 +57,13 @@ def register():
         handlers.append(handler)
     for handlers in _NEW_DATA:
         handlers.append(overlay.on_new_data)
+    bpy.app.timers.register(overlay.sync)  # scenes that show normals: they cannot be looked at while this runs
 
 
 def unregister():
     run.shut_down()
+    if bpy.app.timers.is_registered(overlay.sync):
+        bpy.app.timers.unregister(overlay.sync)
     overlay.remove()
     for handlers in _NEW_DATA:
         handlers.remove(overlay.on_new_data)

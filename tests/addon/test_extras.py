@@ -215,6 +215,19 @@ def test_the_overlay_costs_nothing_while_it_is_off(blender, extension):
     assert len(blender.app.handlers.depsgraph_update_post) == handlers
 
 
+def test_the_overlay_is_back_after_the_extension_was_disabled_and_enabled(blender, extension):
+    overlay, vad_addon = extension("vad_addon.overlay"), extension("vad_addon")
+    blender.context.scene.vad.overlay.show = True
+    vad_addon.unregister()
+    assert overlay._handle is None
+    assert not blender.app.timers.is_registered(overlay.sync)
+    vad_addon.register()
+    assert blender.context.scene.vad.overlay.show
+    assert blender.app.timers.is_registered(overlay.sync)  # Blender calls it when it has a window
+    overlay.sync()
+    assert overlay._handle is not None
+
+
 # Axes fixed by hand
 
 
