@@ -54,9 +54,11 @@ def volume_data(name: str, path: Path, active: str) -> bpy.types.Volume:
 
 
 def replace_data(old: bpy.types.ID, new: bpy.types.ID) -> None:
-    """Put `new` wherever `old` is used, under its name and with its materials, and remove `old`."""
+    """Put `new` wherever `old` is used, under its name and with its materials, flat where it was, and remove `old`."""
     for material in old.materials:
         new.materials.append(material)
+    if isinstance(old, bpy.types.Mesh) and len(old.polygons) and not any(face.use_smooth for face in old.polygons):
+        new.shade_flat()
     old.user_remap(new)
     name = old.name
     bpy.data.batch_remove([old])

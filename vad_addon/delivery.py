@@ -52,6 +52,7 @@ def deliver(
             results.note_sources(collection, objects_of(source))
         rollback.pop_all()
     before, mesh = set(results.members(collection)), results.mesh(collection)
+    _recast(collection, made)
     turned = results.note_turn(collection)
     looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
     for role in roles:
@@ -116,6 +117,20 @@ def _data(source, outcome, warnings, rollback):
             rollback.callback(path.unlink)
             made[results.FIELD] = keep(datablocks.volume_data(f"{name} field", path, "density"))
     return made
+
+
+def _recast(collection, made):
+    """Let the one mesh that there is play the role of the one that takes its place, with all that the user gave it."""
+    there = [obj for obj in results.members(collection) if results.role(obj) in results.MESHES]
+    asked = [role for role in results.MESHES if role in made]
+    if len(there) == len(asked) == 1 and results.member(collection, asked[0]) is None:
+        (obj,), (new,), old = there, asked, results.role(there[0])
+        obj[results.ROLE] = new
+        results.hold(collection, obj)
+        made[new].name = obj.data.name  # which leaves its own to that
+        for block in (obj, obj.data):
+            head, found, tail = block.name.rpartition(f" {old}")
+            block.name = f"{head} {new}{tail}" if found else block.name
 
 
 def _place(collection, role, data, origin, turned):

@@ -131,6 +131,25 @@ def test_materials_modifiers_and_places_survive(blender, run, scan):
     assert duplicate.data == made["surface"].data
 
 
+@pytest.mark.parametrize(("first", "then"), [("double", "single"), ("single", "signed")])
+def test_the_mesh_that_takes_the_place_of_another_keeps_what_the_user_gave_it(blender, run, scan, first, then):
+    made = run(surface=first)
+    (mesh,) = set(made.values()) - {made["samples"], made["field"]}
+    mesh.data.materials.clear()
+    mesh.data.materials.append(blender.data.materials.new("Mine"))
+    mesh.modifiers.new("Mine", "SMOOTH")
+    mesh.data.shade_flat()
+    mesh.hide_set(True)
+    made = run(surface=then)
+    role = "sheet" if then == "single" else "surface"
+    assert made[role] == mesh
+    assert mesh.name == mesh.data.name == f"Scan {role}"
+    assert [material.name for material in mesh.data.materials] == ["Mine"]
+    assert "Mine" in mesh.modifiers
+    assert mesh.hide_get()
+    assert not any(face.use_smooth for face in mesh.data.polygons)
+
+
 def test_an_object_whose_transforms_were_applied_is_placed_anew(blender, run, scan):
     scan.location = 0, 0, 10
     surface = run()["surface"]
