@@ -9,21 +9,30 @@ from . import axes, points_in, results, shapes
 
 
 def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
-    """The run whose results are meant: the one the active object belongs to, else the scene's last."""
+    """The run whose results are meant: the one the active object belongs to, else one of what is selected, else one
+    that this was joined for. The scene's last where nothing that can be read is active."""
     obj = points_in.active_object(context)
-    if obj is not None:
-        if run := results.run_of(obj):
-            return run
-        if made := results.previous(context.scene, points_in.sources(context)):
-            return made
+    if obj is None:
+        return context.scene.vad.result
+    found = results.run_of(obj) or results.previous(context.scene, points_in.sources(context))
+    if found is not None or obj.type in points_in.READABLE:
+        return found or results.joined(context.scene, obj)
     return context.scene.vad.result
+
+
+def no_results(context: bpy.types.Context) -> str:
+    """What to say where :func:`chosen_result` finds none."""
+    obj = points_in.active_object(context)
+    if obj is None or context.scene.vad.result is None:
+        return "There are no results yet: reconstruct first"
+    return f"{obj.name} has no results yet: reconstruct it first, or select results"
 
 
 def _adding_problem(context):
     """Why nothing can be added to the results that are meant, one line; empty where it can."""
     collection = chosen_result(context)
     if collection is None:
-        return "There are no results yet: reconstruct first"
+        return no_results(context)
     if not results.is_editable(collection):
         return f"{collection.name} is linked from another file: make it local"
     if not results.is_in(collection, context.view_layer):
@@ -136,7 +145,7 @@ class VAD_OT_show(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        cls.poll_message_set("There are no results yet: reconstruct first")
+        cls.poll_message_set(no_results(context))
         return chosen_result(context) is not None
 
     @classmethod

@@ -75,10 +75,10 @@ class VAD_PT_last_run(_Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return context.scene.vad.result is not None
+        return extras.chosen_result(context) is not None
 
     def draw(self, context):
-        result = context.scene.vad.result
+        result = extras.chosen_result(context)
         lines = self.layout.column(align=True)
         lines.label(text=result.name, icon="OUTLINER_COLLECTION")
         for line in results.summary(result):
@@ -97,6 +97,7 @@ class VAD_PT_look(_Sidebar, bpy.types.Panel):
 
     def draw(self, context):
         collection, layer = extras.chosen_result(context), context.view_layer
+        self.layout.label(text=collection.name, icon="OUTLINER_COLLECTION")
         row = self.layout.row(align=True)
         for role, name, _ in results.SHOWN:
             objects = [obj for obj in results.shown_as(collection, role) if obj.name in layer.objects]

@@ -122,6 +122,14 @@ def previous(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bpy.typ
     return scene.vad.result if scene.vad.result in made else (made or [None])[-1]
 
 
+def joined(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Collection | None:
+    """The latest results that a run made of `obj`, or of several objects that it is one of; the last run's may be out
+    of the scene."""
+    last = [scene.vad.result] if scene.vad.result is not None else []
+    made = [collection for collection in (*last, *scene.collection.children_recursive) if obj in sources(collection)]
+    return made[-1] if made else None
+
+
 def is_editable(block: bpy.types.ID) -> bool:
     """Whether `block` is of this .blend: what is linked, or overridden, takes no other objects and no other data."""
     return block.library is None and block.override_library is None

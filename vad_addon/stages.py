@@ -125,7 +125,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
     def problem(cls, context):
         collection = extras.chosen_result(context)
         if collection is None:
-            return "There are no results yet: reconstruct first"
+            return extras.no_results(context)
         if results.member(collection, results.SAMPLES) is None:
             return f"{collection.name} has no samples any more: reconstruct again"
         return ""

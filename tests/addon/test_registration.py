@@ -132,8 +132,39 @@ def test_the_tab_shows_and_hides_what_there_is(blender, extension, add_mesh, sph
     assert not extension("vad_addon.panel").VAD_PT_look.poll(blender.context)
     blender.ops.vad.reconstruct(resolution=16)
     layout = drawn(blender, extension, "VAD_PT_look")
-    assert layout.texts == ["[Surface]", "Field", "Points", "[Scan]"]
+    assert layout.texts == ["Scan VAD", "[Surface]", "Field", "Points", "[Scan]"]
     assert layout.operators[:5] == ["vad.show"] * 4 + ["vad.reextract"]
+
+
+def test_the_tab_is_about_what_is_active(blender, extension, add, add_mesh, sphere):
+    panels = "VAD_PT_last_run", "VAD_PT_look"
+
+    def told():
+        assert all(getattr(extension("vad_addon.panel"), name).poll(blender.context) for name in panels)
+        (name,) = {drawn(blender, extension, name).texts[0] for name in panels}
+        return name
+
+    scans = [add_mesh(name, sphere) for name in ("First", "Second", "Third")]
+    for scan in scans:
+        scan.select_set(False)
+    for scan in scans[:2]:
+        blender.context.view_layer.objects.active = scan
+        blender.ops.vad.reconstruct(resolution=16)
+    for active in ("First", "First field", "First surface"):
+        blender.context.view_layer.objects.active = blender.data.objects[active]
+        assert told() == "First VAD"
+    blender.context.view_layer.objects.active = scans[2]
+    assert not any(getattr(extension("vad_addon.panel"), name).poll(blender.context) for name in panels)
+    for operator in (blender.ops.vad.reextract, blender.ops.vad.shell):
+        with pytest.raises(RuntimeError, match="Third has no results yet: reconstruct it first, or select results"):
+            operator()
+    for scan in scans[1:]:
+        scan.select_set(True)
+    blender.ops.vad.reconstruct(resolution=16)
+    scans[1].select_set(False)
+    assert told() == "Third VAD"
+    add("Eye", blender.data.cameras.new("Eye"))
+    assert told() == "Third VAD"
 
 
 def test_every_panel_draws_before_and_after_a_run_and_while_axes_are_fixed(blender, extension, add_mesh, sphere):
