@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.points import MINIMUM_SAMPLES
 from . import attributes, results
 from .attributes import Attribute
 
@@ -127,6 +128,11 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
     if not len(points):
         what = "selected points" if selected_only and in_edit_mode(objects[0]) else "points"
         raise InputError(f"{name} has 0 {what}: select an object with vertices or points")
+    if len(points) < MINIMUM_SAMPLES and any(_has_instances(obj, context) for obj in objects):
+        raise InputError(
+            f"{name} has {len(points)} points, the origins of instances: add Realize Instances at the end of its "
+            "geometry nodes"
+        )
     joined = attributes.join([(len(points), carried) for points, carried in clouds])
     axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
     fixed = np.flatnonzero(axes.any(axis=1))
@@ -220,6 +226,11 @@ def _spline_selection(obj):
         for spline in obj.original.data.splines
     ]
     return np.concatenate([_values(some, name, bool) for some, name in points])
+
+
+def _has_instances(obj, context):
+    geometry = _geometry(obj, context)
+    return _has_points(geometry.instances_pointcloud())
 
 
 def _has_points(cloud):

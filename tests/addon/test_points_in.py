@@ -110,8 +110,8 @@ def test_hair_curves(read, blender, add):
     assert_allclose(read(add("Hair", data)), positions.reshape(5, 3))
 
 
-@pytest.mark.parametrize("instances", [False, True])
-def test_points_made_by_geometry_nodes(read, blender, add_mesh, sphere, instances):
+def made_by_nodes(blender, obj, instances):
+    """Let geometry nodes make points of the vertices of `obj`, or instances there."""
     nodes = blender.data.node_groups.new("nodes", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
         nodes.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
@@ -122,9 +122,20 @@ def test_points_made_by_geometry_nodes(read, blender, add_mesh, sphere, instance
         cube = nodes.nodes.new("GeometryNodeMeshCube")
         nodes.links.new(cube.outputs[0], middle.inputs["Instance"])
     nodes.links.new(middle.outputs[0], end.inputs[0])
-    obj = add_mesh("Scan", sphere)
     obj.modifiers.new("nodes", "NODES").node_group = nodes
-    assert_allclose(read(obj), sphere, atol=1e-7)
+    return obj
+
+
+@pytest.mark.parametrize("instances", [False, True])
+def test_points_made_by_geometry_nodes(read, blender, add_mesh, sphere, instances):
+    assert_allclose(read(made_by_nodes(blender, add_mesh("Scan", sphere), instances)), sphere, atol=1e-7)
+
+
+def test_few_instances_are_told_from_few_points(blender, read, add_mesh, extension):
+    read(made_by_nodes(blender, add_mesh("Few", np.eye(3)), instances=False))
+    scan = made_by_nodes(blender, add_mesh("Scan", np.zeros((1, 3))), instances=True)
+    with pytest.raises(extension("core.errors").InputError, match="Scan has 1 points, the origins of instances: add R"):
+        read(scan)
 
 
 def test_an_object_without_points_is_refused(read, add_mesh, extension):
