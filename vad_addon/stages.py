@@ -43,6 +43,7 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         stored = context.scene.vad
         if not self.properties.is_property_set("strength") and settings_from(stored).denoise not in {"auto", 0.0}:
             self.strength = settings_from(stored).denoise
+        results.leave_modes(context)  # else the copy could not become the active object
         outliers = taken_over(stored, self.properties, ["outliers"])
         settings = settings_from(stored, denoise=self.strength, **outliers)
         return Task(self._source.points, settings, until=CLEANING)

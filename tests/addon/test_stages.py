@@ -69,6 +69,22 @@ def test_cleaned_points_are_a_copy_with_all_that_they_carry(blender, scan, noisy
     assert_array_equal(number[held.any(axis=1)], [3, 400])
 
 
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
+def test_cleaned_points_are_the_active_object_whatever_mode_it_was_in(blender, scan, mode):
+    blender.ops.object.mode_set(mode=mode)
+    if mode == "EDIT":
+        blender.ops.mesh.select_all(action="DESELECT")
+        blender.context.scene.vad.selected_only = True
+        with pytest.raises(RuntimeError, match="Scan has 0 selected points"):
+            blender.ops.vad.denoise()
+        assert scan.mode == mode
+        blender.ops.mesh.select_all(action="SELECT")
+    blender.ops.vad.denoise()
+    assert blender.context.view_layer.objects.active.name == "Scan cleaned"
+    assert blender.context.mode == scan.mode == "OBJECT"
+    assert scan.hide_get()
+
+
 def test_strength_and_outliers_are_obeyed(blender, scan, noisy):
     blender.ops.vad.denoise(strength=0.0, outliers=False)
     made = blender.context.view_layer.objects.active
