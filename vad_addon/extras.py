@@ -154,13 +154,16 @@ class VAD_OT_show(bpy.types.Operator):
 
     def execute(self, context):
         collection = chosen_result(context)
-        objects = results.shown_as(collection, self.role)
+        objects = [obj for obj in results.shown_as(collection, self.role) if obj.name in context.scene.objects]
         if not objects:
             self.report({"ERROR"}, f"{collection.name} has no {self.role}: it was deleted, or not asked for")
             return {"CANCELLED"}
-        shown = any(obj.hide_get() for obj in objects)
+        shown = not all(obj.visible_get() for obj in objects)
         for obj in objects:
             results.show(context.scene, obj, shown)
+        for obj in objects:
+            if shown and not obj.visible_get():
+                self.report({"WARNING"}, f"{obj.name} is off, or its collection is hidden: show it in the outliner")
         return {"FINISHED"}
 
 

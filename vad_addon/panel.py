@@ -102,7 +102,7 @@ class VAD_PT_look(_Sidebar, bpy.types.Panel):
         for role, name, _ in results.SHOWN:
             objects = [obj for obj in results.shown_as(collection, role) if obj.name in layer.objects]
             if objects:
-                shown = not any(obj.hide_get() for obj in objects)
+                shown = all(obj.visible_get() for obj in objects)
                 row.operator(extras.VAD_OT_show.bl_idname, text=name, depress=shown).role = role
         self.layout.operator(stages.VAD_OT_reextract.bl_idname, icon="FILE_REFRESH")
         column = self.layout.column(align=True)

@@ -365,6 +365,28 @@ def test_the_scan_is_shown_and_hidden_like_its_results(blender, run, scan):
         blender.ops.vad.show(role="sheet")
 
 
+@pytest.mark.parametrize("how", ["eye", "excluded", "off"])
+def test_what_cannot_be_shown_is_said(blender, run, scan, capfd, how):
+    surface, home = run()["surface"], blender.context.scene.vad.result
+    layer = blender.context.view_layer.layer_collection.children[home.name]
+    if how == "eye":
+        layer.hide_viewport = True
+    elif how == "excluded":
+        layer.exclude = True
+    else:
+        surface.hide_viewport = True
+    for _ in range(2):
+        blender.ops.vad.show(role="surface")
+        assert "Warning: Scan surface is off, or its collection is hidden: show it in" in capfd.readouterr().out
+    layer.hide_viewport = layer.exclude = surface.hide_viewport = False
+    blender.context.view_layer.update()
+    assert surface.visible_get()
+    for visible in (False, True):
+        blender.ops.vad.show(role="surface")
+        assert surface.visible_get() == visible
+    assert not capfd.readouterr().out
+
+
 def test_the_mesh_takes_the_stage_from_all_that_it_was_made_of(blender, run, scan, add_mesh, sphere, extension):
     results = extension("vad_addon.results")
     blender.ops.vad.normals()
@@ -505,6 +527,9 @@ def test_what_is_gone_of_what_was_joined_is_said(blender, folder, run, joined, e
         again = run()
         assert count(again) == 500
         assert count(made) == 1000
+        for visible in (False, True):
+            blender.ops.vad.show(role="source")
+            assert left.visible_get() == visible
         (warning,) = extension("vad_addon.results").warnings(blender.context.scene.vad.result)
         assert warning == f"{name} is gone: the run is on {left.name} alone"
         blender.ops.wm.save_mainfile()
