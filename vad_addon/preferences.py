@@ -16,8 +16,8 @@ _given = {}  # by name, what was preferred when scenes were last looked at
 
 
 class VAD_OT_clear_cache(bpy.types.Operator):
-    """Delete the volumes in the cache folder, where they are kept until the file is saved. Those that this file shows
-    stay; another file that was not saved, and is recovered later, loses its own"""
+    """Delete the volumes in the cache folder, where they are kept until the file is saved. Those that this file shows,
+    and those that undo may bring back, stay; another file that was not saved, and is recovered later, loses its own"""
 
     bl_idname = "vad.clear_cache"
     bl_label = "Clear Cache"

@@ -186,14 +186,15 @@ def cache_contents() -> tuple[int, int]:
 
 
 def clear_cache() -> int:
-    """Delete the volumes in the cache folder that no data-block of this file reads; returns the bytes freed.
+    """Delete the volumes in the cache folder that no data-block of this file reads, nor may read once something is
+    undone; returns the bytes freed.
 
     Raises :class:`VADError` where one cannot be deleted.
     """
-    shown = used()
+    kept = used() | _made
     freed = 0
     for path in cache_folder().rglob("*.vdb"):
-        if path.resolve() not in shown:
+        if path.resolve() not in kept:
             size = path.stat().st_size
             try:
                 path.unlink()

@@ -113,17 +113,24 @@ def test_the_cache_folder_may_be_another(blender, extension, add_mesh, sphere, t
     for _ in range(2):
         blender.ops.vad.reconstruct(resolution=16)
     assert blender.data.volumes["Scan field"].filepath == str(folder / "Scan_001.vdb")
+    files._made.clear()
     blender.ops.vad.clear_cache()
     assert [path.name for path in tmp_path.rglob("*.vdb")] == ["mine.vdb", "Scan_001.vdb"]
 
 
-def test_clearing_the_cache_spares_what_is_shown(blender, extension, add_mesh, sphere):
+def test_clearing_the_cache_spares_what_is_shown_and_what_undo_brings_back(blender, extension, add_mesh, sphere):
     files = extension("vad_addon.volume_files")
+    folder = files.cache_folder()
+    folder.mkdir(exist_ok=True)
+    for path in folder.glob("*.vdb"):
+        path.unlink()
+    (folder / "Other.vdb").write_text("of another session")
     add_mesh("Scan", sphere)
+    blender.ops.ed.undo_push(message="before")
     for _ in range(2):
-        blender.ops.vad.reconstruct(resolution=16)
-    assert files.cache_contents()[0] >= 2
+        blender.ops.vad.reconstruct("EXEC_DEFAULT", True, resolution=16)
     assert blender.ops.vad.clear_cache() == {"FINISHED"}
-    count, size = files.cache_contents()
-    assert (count, size > 1000) == (1, True)
+    assert {path.name for path in folder.glob("*.vdb")} == {"Scan.vdb", "Scan_001.vdb"}
+    blender.ops.ed.undo()
+    assert blender.data.volumes["Scan field"].filepath == str(folder / "Scan.vdb")
     assert blender.data.volumes["Scan field"].grids.load()
