@@ -6,38 +6,27 @@ import bpy
 import numpy as np
 
 from ..core.budget import advised_band, estimate_cost, suited_resolution
-from ..core.cleaning.clean import clean
-from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
-from ..core.points import local_spacing, prepare_samples
-from ..core.progress import Progress
 from ..core.settings import WHOLE_BOX, Settings
-from . import points_in, status
+from . import points_in, run, status
+from .outcome import COST, Outcome, Task
 from .properties import chosen, settings_from
-from .run import percentage
 
 
 @dataclass(frozen=True)
 class Points:
-    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, the factor that takes
-    these lengths to scene units, and whether the samples look noisy."""
+    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, in scene units, and
+    whether the samples look noisy."""
 
     corners: np.ndarray
     spacing: np.ndarray
-    scale: float
     noisy: bool
 
     @classmethod
-    def of(cls, points: np.ndarray, outliers: bool = True, progress=None) -> "Points":
-        """Those of (n,3) points, where `outliers` without strays. Raises :class:`InputError` for points that cannot be
-        used."""
-        progress = Progress.of(progress)
-        samples = prepare_samples(points, progress.part(0.0, 0.3)).in_spatial_order()
-        samples, _ = clean(samples, Settings(outliers=outliers, denoise=0.0), progress.part(0.3, 0.5))
-        corners = np.stack([samples.points.min(axis=0), samples.points.max(axis=0)])
-        spacing = local_spacing(samples.points, progress.part(0.5, 0.9))
-        return cls(corners, spacing, samples.scale, looks_noisy(samples.points, spacing))
+    def of(cls, found: Outcome) -> "Points":
+        """What was found where :data:`COST` was asked for."""
+        return cls(np.stack([found.points.min(axis=0), found.points.max(axis=0)]), found.spacing, found.noisy)
 
     def suits(self) -> int:
         """The resolution at which the points are a cell and a half apart."""
@@ -48,7 +37,7 @@ class Points:
         noisy = self.noisy if settings.denoise == "auto" else settings.denoise > 0
         estimate = estimate_cost(self.spacing, fit_grid(self.corners, settings.resolution), settings, noisy)
         return [
-            f"{len(self.spacing):,} points, {np.median(self.spacing) * self.scale:.3g} apart",
+            f"{len(self.spacing):,} points, {np.median(self.spacing):.3g} apart",
             f"Suits: resolution {self.suits()}",
             f"At {settings.resolution}: {status.duration(estimate.seconds)}, {estimate.memory_mb:,.0f} MiB",
         ]
@@ -88,33 +77,26 @@ def _selected(context):
     return names, points_in.point_count(objects, context), chosen(stored)["selected_only"], stored.outliers
 
 
-class VAD_OT_estimate(bpy.types.Operator):
+class VAD_OT_estimate(run.Run, bpy.types.Operator):
     """Show how long the run would take, how much memory it would need, and which resolution suits the points"""
 
     bl_idname = "vad.estimate"
     bl_label = "Estimate Cost"
     bl_options = {"INTERNAL"}
 
-    @classmethod
-    def poll(cls, context):
-        problem = points_in.selection_problem(context)
-        cls.poll_message_set(problem)
-        return not problem
+    def instant(self, task):
+        return len(task.points) <= 30_000
 
-    def execute(self, context):
+    def prepare(self, context):
+        self._of = _selected(context)
+        source = points_in.selected(context, context.scene.vad.selected_only)
+        return Task(source.points, settings_from(context.scene.vad), until=COST)
+
+    def deliver(self, context, scene, found):
         global _asked
-        try:
-            stored = context.scene.vad
-            source = points_in.selected(context, stored.selected_only)
-            with percentage(context.window_manager) as progress:
-                _asked = _selected(context), Points.of(source.points, stored.outliers, progress)
-            _told.clear()
-            settings_from(stored)
-        except VADError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, "; ".join(lines(context)))
-        return {"FINISHED"}
+        _asked = self._of, Points.of(found)
+        _told.clear()
+        self.report({"INFO"}, "; ".join(_asked[1].cost(settings_from(scene.vad))))
 
 
 class VAD_OT_use_resolution(bpy.types.Operator):

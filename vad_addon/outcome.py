@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core import pipeline
 from ..core.cleaning.clean import clean
+from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.integration import near_band
 from ..core.field.local_surface import fit_local_surface
@@ -25,6 +26,7 @@ from ..core.surface.facts import mesh_facts
 from . import stored_field
 
 CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
+COST = "cost"  # no run, but what its cost depends on
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Task:
 
     points      : (n,3) float64
     constraints : (indices (k,), axes (k,3)) or None
-    until       : the last stage: CLEANING, NORMALS or ALL
+    until       : the last stage: CLEANING, NORMALS or ALL; or COST
     known       : (axes (n,3), confidence (n,)) of an earlier run, which is taken up after its normals, or None
     origin      : (3,) float64, exact in single precision, that results are to be relative to; None: their own centre
     volume      : .vdb file of the field that is `known` too, or None; :func:`stored_field.suffices` for these settings
@@ -108,6 +110,8 @@ class Outcome:
     report   : JSON text
     warnings : what went less than well, one line each
     seconds  : duration of the reconstruction
+    spacing  : (n',) float64, local spacing of the points, if asked for COST
+    noisy    : whether they look noisy, if asked for that
     """
 
     points: np.ndarray
@@ -123,14 +127,16 @@ class Outcome:
     report: str
     warnings: tuple[str, ...]
     seconds: float
+    spacing: np.ndarray | None = None
+    noisy: bool | None = None
 
     def save(self, path: Path) -> None:
-        names = "points", "source_index", "normals", "confidence", "origin"
+        names = "points", "source_index", "normals", "confidence", "origin", "spacing"
         arrays = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         for skin in _SKINS:
             if (found := getattr(self, skin)) is not None:
                 arrays |= {f"{skin}.{name}": array for name, array in vars(found).items()}
-        facts = {name: getattr(self, name) for name in ("cell", "shape", "report", "warnings", "seconds")}
+        facts = {name: getattr(self, name) for name in ("cell", "shape", "report", "warnings", "seconds", "noisy")}
         facts["volume"] = self.volume and str(self.volume)
         np.savez(path, **arrays, facts=json.dumps(facts))
 
@@ -160,9 +166,36 @@ def compute(task: Task, folder: Path, progress=None) -> Outcome:
         progress = Progress.of(progress)
         if task.volume:
             return _extracted(task, progress)
+        if task.until == COST:
+            return _measured(task, progress)
         return _reconstructed(task, folder, progress) if task.until == ALL else _begun(task, progress)
     except MemoryError as error:
         raise VADError("Out of memory: lower the resolution, or give fewer points") from error
+
+
+def _measured(task, progress):
+    """The samples without strays, and what a run's cost depends on. Neither steps of depth nor noise are mended."""
+    start = time.perf_counter()
+    samples = prepare_samples(task.points, progress.part(0.0, 0.3, "points")).in_spatial_order()
+    samples, _ = clean(samples, replace(task.settings, denoise=0.0), progress.part(0.3, 0.5, "cleaning"))
+    spacing = local_spacing(samples.points, progress.part(0.5, 0.9, "cleaning"))
+    return Outcome(
+        points=samples.given,
+        source_index=samples.source_index,
+        normals=None,
+        confidence=None,
+        surface=None,
+        sheet=None,
+        volume=None,
+        origin=centre(samples.given),
+        cell=float(np.median(spacing)) * samples.scale,
+        shape=(),
+        report="{}",
+        warnings=samples.warnings,
+        seconds=time.perf_counter() - start,
+        spacing=spacing * samples.scale,
+        noisy=bool(looks_noisy(samples.points, spacing)),
+    )
 
 
 def _begun(task, progress):

@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 
 
-def test_the_estimate_names_points_resolution_time_and_memory(blender, extension, sphere):
+@pytest.fixture
+def points_of(extension, tmp_path):
+    """Function: what the cost of a run on (n,3) points depends on."""
+    outcome, settings = extension("vad_addon.outcome"), extension("core.settings").Settings()
+    of = extension("vad_addon.cost").Points.of
+    return lambda points: of(outcome.compute(outcome.Task(points, settings, until="cost"), tmp_path))
+
+
+def test_the_estimate_names_points_resolution_time_and_memory(blender, extension, points_of, sphere):
     settings = extension("core.settings").Settings
     dense = np.concatenate([sphere, sphere @ [[0, 1, 0], [0, 0, 1], [1, 0, 0]]])
-    points = extension("vad_addon.cost").Points.of(50 * dense)
+    points = points_of(50 * dense)
     lines = points.cost(settings(resolution=100))
     count, apart = re.fullmatch(r"([\d,]+) points, ([\d.]+) apart", lines[0]).groups()
     assert count == "1,000"
@@ -68,13 +76,12 @@ def test_strays_count_where_they_stay(blender, extension, add_mesh, sphere):
     assert cost.lines(blender.context)[0].startswith("501 points")
 
 
-def test_noisy_points_are_noticed(extension):
+def test_noisy_points_are_noticed(points_of):
     rng = np.random.default_rng(0)
     points = rng.normal(size=(20_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    of = extension("vad_addon.cost").Points.of
-    assert not of(points).noisy
-    assert of(points + rng.normal(size=points.shape) * 0.02).noisy
+    assert not points_of(points).noisy
+    assert points_of(points + rng.normal(size=points.shape) * 0.02).noisy
 
 
 def test_a_fine_resolution_comes_with_a_band(blender, extension, add_mesh, sphere):

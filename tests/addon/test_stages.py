@@ -416,7 +416,7 @@ def test_each_is_one_undo_step(blender, scan, operator, more):
     assert state() == before
 
 
-@pytest.mark.parametrize("until", ["cleaning", "normals"])
+@pytest.mark.parametrize("until", ["cleaning", "normals", "cost"])
 def test_the_worker_finds_the_same(extension, sphere, tmp_path, until):
     outcome, job = extension("vad_addon.outcome"), extension("vad_addon.job")
     axes = np.array([3, 70]), np.array([[0.0, 0, 1], [1, 0, 0]])
@@ -432,7 +432,9 @@ def test_the_worker_finds_the_same(extension, sphere, tmp_path, until):
     expected = outcome.compute(task, tmp_path)
     for name in ("points", "source_index", "normals", "confidence", "origin", "cell", "shape"):
         assert_array_equal(getattr(found, name), getattr(expected, name))
-    assert (found.normals is None) == (until == "cleaning")
+    assert (found.normals is None) == (until != "normals")
+    assert_array_equal(found.spacing, expected.spacing)
+    assert (found.noisy, found.spacing is None) == (expected.noisy, until != "cost")
     assert found.surface is found.sheet is found.volume is None
 
 
