@@ -90,6 +90,7 @@ def case(gui):
     bpy.context.scene.vad.result.objects.link(copy)
     yield 0.2
     assert lines("11_copy") > 0.8 * shown
+    gui.module("vad_addon.results").hold(bpy.context.scene.vad.result, copy)  # else it is the user's
     bpy.context.scene.vad.overlay.show = False
     yield 0.2
     assert lines("12_off") == 0
