@@ -6,7 +6,7 @@ from core import Settings, reconstruct
 from core.normals.planes import onto_planes
 from core.points import local_spacing
 from tests import shapes
-from tests.core.normals.test_creases import degrees, off_all_faces, parted, roof, scattered_cube
+from tests.core.normals.test_creases import off_all_faces, parted, roof, scattered_cube
 
 
 def box_lattice(*cells: int) -> np.ndarray:
@@ -105,13 +105,3 @@ def test_samples_that_are_not_suspect_and_lines_stay(random):
     np.testing.assert_allclose(np.abs(axes[suspect]), np.tile([0, 0, 1.0], (suspect.sum(), 1)), atol=1e-9)
     line = np.linspace([0.0, 0, 0], [1, 2, 3], 50)
     assert not moved_from(np.tile([0.6, 0.0, 0.8], (50, 1)), line)[1].any()
-
-
-def test_the_narrow_face_of_a_thin_wall_has_its_own_normal():
-    """A wall 1.3 samples thick; with few neighbours asked .40 of the axes there were wrong."""
-    thick, sides = 0.065, [[(0, 0, 0), (3, 0, 1)], [(0, 0.065, 0), (3, 0.065, 1)], [(0, 0, 1), (3, 0.065, 1)]]
-    points = shapes.scattered_rectangles(sides, int((2 + thick) * 3 * (1.3 / thick) ** 2))
-    top = points[:, 2] == 1
-    axes = parted(points @ shapes.random_rotation(2).T)[1] @ shapes.random_rotation(2)
-    up = np.broadcast_to([0.0, 0.0, 1.0], axes.shape)
-    assert (degrees(axes, up) > 20)[top].mean() < 0.2
