@@ -27,7 +27,7 @@ GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
 OPPOSITE = float(np.cos(GAP / 2))  # least cosine, to the direction opposite to a gap, of what lies there
-BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
+_BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
 
 _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
 _STEP = 0.35  # they may be off each other's plane by this share of their distance
@@ -259,7 +259,7 @@ def rows_at_a_time(bridge: float, n: int) -> int:
 
 def bridged_reach(distance, spacing) -> np.ndarray:
     """How far patches cover gaps of width `distance` (m,) that are bridged, (m,)."""
-    return np.maximum(DISC * spacing, BRIDGED * distance)
+    return np.maximum(DISC * spacing, _BRIDGED * distance)
 
 
 def chains(rims: Rims, marked) -> np.ndarray:

@@ -13,15 +13,15 @@ from ...linalg import row_dots, unit
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
-from .borders import BRIDGED, DISC, OPPOSITE, Rims, bridged_reach
+from .borders import DISC, OPPOSITE, Rims, bridged_reach, one_sheet
 
-_EVEN = 1.5  # times the gap to the next line behind, at most, that the crease is away
-_AHEAD = 0.8  # least cosine between the way across the gap and that to the crease
+_EVEN = 1.5  # times the distance of the next line behind, at most, that the crease is away
+_AHEAD = 0.8  # least cosine between the way across the line and that to the next one
 _IN_PLANE = 0.2  # of its distance, that a sample on the crease may be off the plane of the lines
 _FOLDED = 0.7  # largest |n_i . n_j| of the two sheets
 _ALONG = 0.8  # least cosine between the line and the crease
-_FACING = 0.7  # least sine between the line and the gap at the crease
-_MOST = 256  # samples among which the crease is looked for
+_EDGE = 0.3  # local spacings, at most, that the other sheet goes on past it
+_MOST = 256  # samples among which lines and the crease are looked for
 _CHUNK = 512  # samples
 
 
@@ -54,16 +54,13 @@ class Added:
 
 
 def samples_beside_creases(rims: Rims, cloud: Cloud, progress=None) -> Added:
-    """Samples to be added where sheets of lines, which are joined to others behind them, end at creases: where a sample
-    ahead of a line, in its plane and about as far as the next one, is at the rim of a sheet that meets this plane along
-    the line."""
-    spacing, covered = cloud.spacing, np.stack([rims.reach, rims.behind], axis=1)
-    row = np.flatnonzero((cloud.lines.number >= 0) & rims.gap & (covered > DISC * spacing[:, None]).any(axis=1))
-    row = row[(covered[row] <= DISC * spacing[row, None]).any(axis=1)]
+    """Samples to be added where sheets of lines end at creases: where a line has another one behind it and none ahead,
+    but, in its plane and about as far as that, a sample at the edge of a sheet that meets this plane along the line."""
+    row, way = _free_sides(rims, cloud)
     found = np.empty(len(row), np.int64)
 
     def look(part):
-        return _across(row[part], rims, cloud, covered[row[part]])
+        return _across(row[part], way[part], cloud)
 
     for part, other in in_order(look, Progress.of(progress).chunks(len(row), _CHUNK)):
         found[part] = other
@@ -73,26 +70,57 @@ def samples_beside_creases(rims: Rims, cloud: Cloud, progress=None) -> Added:
     nearest = nearest[np.unique(found[nearest], return_index=True)[1]]
     row, found, way = row[nearest], found[nearest], unit(step[nearest])
     own = cloud.normals[row]
-    places = cloud.points[found] + spacing[found, None] * way
+    places = cloud.points[found] + cloud.spacing[found, None] * way
     return Added(places, unit(own - row_dots(own, way)[:, None] * way), found, row)
 
 
-def _across(row, rims, cloud, covered):
-    """The sample on the crease that each of some samples `row` (r,) looks at across a gap that is not covered, -1 where
-    there is none."""
-    points, normals, spacing = cloud.points, cloud.normals, cloud.spacing
-    distance, other = cloud.tree.query(points[row], k=min(_MOST, len(cloud)))
-    step, own, theirs = points[other] - points[row, None], normals[row, None], normals[other]
-    ahead = np.where(covered[:, 0] > DISC * spacing[row], -1.0, 1.0)[:, None] * rims.outward[row]
-    near = (distance > 0) & (distance <= _EVEN / BRIDGED * covered.max(axis=1)[:, None])
-    near &= np.einsum("rki,ri->rk", step, ahead) > _AHEAD * distance
-    near &= np.abs(row_dots(step, own)) < _IN_PLANE * distance
-    line = cloud.lines.along[row, None]
+def _free_sides(rims, cloud):
+    """Samples on lines, (r,), and unit ways (r,3) across these in the tangent plane in which no sample around lies on
+    their sheet, and no patch covers a gap."""
+    row = np.repeat(np.flatnonzero(cloud.lines.number >= 0), 2)
+    way = unit(np.cross(cloud.normals[row], cloud.lines.along[row]))
+    way[1::2] *= -1
+    towards = row_dots(way, rims.outward[row])
+    covered = np.where(towards > OPPOSITE, rims.reach[row], np.where(towards < -OPPOSITE, rims.behind[row], 0.0))
+    other = cloud.neighbours[row]
+    step, distance = _steps(row, other, cloud)
+    ahead = np.einsum("rki,ri->rk", step, way) > _AHEAD * distance
+    ahead &= one_sheet(step, cloud.normals[row, None], cloud.normals[other])
+    free = ~ahead.any(axis=1) & (covered <= DISC * cloud.spacing[row])
+    return row[free], way[free]
+
+
+def _across(row, way, cloud):
+    """The sample on the crease that each of some samples `row` (r,) looks at in ways (r,3), -1 where there is none."""
+    normals, every = cloud.normals, np.arange(len(row))
+    other = cloud.tree.query(cloud.points[row], k=min(_MOST, len(cloud)))[1]
+    step, distance = _steps(row, other, cloud)
+    own, theirs, line = normals[row, None], normals[other], cloud.lines.along[row, None]
+    along = np.einsum("rki,ri->rk", step, way)
+    sheet = one_sheet(step, own, theirs)
+    behind = np.where(sheet & (along < -_AHEAD * distance), distance, np.inf).min(axis=1)
+    ahead = along > _AHEAD * distance
+    next_one = np.where(sheet & ahead, distance, np.inf).min(axis=1)
+    farthest = np.minimum(next_one, np.where(np.isfinite(behind), _EVEN * behind, 0.0))
     fold = np.cross(own, theirs)
-    sine = np.linalg.norm(fold, axis=2)
-    near &= rims.open[other] & (np.abs(row_dots(own, theirs)) < _FOLDED)
-    near &= np.abs(row_dots(fold, line)) > _ALONG * sine
-    near &= row_dots(rims.outward[other], line) ** 2 < 1 - _FACING**2
-    chosen = near.argmax(axis=1)
-    every = np.arange(len(row))
-    return np.where(near[every, chosen], other[every, chosen], -1)
+    crease = ahead & (distance > DISC * cloud.spacing[row, None]) & (distance < farthest[:, None])
+    crease &= np.abs(row_dots(step, own)) < _IN_PLANE * distance
+    crease &= np.abs(row_dots(own, theirs)) < _FOLDED
+    crease &= np.abs(row_dots(fold, line)) > _ALONG * np.linalg.norm(fold, axis=2)
+    chosen = other[every, crease.argmax(axis=1)]
+    return np.where(crease.any(axis=1) & _at_edge(chosen, normals[row], cloud), chosen, -1)
+
+
+def _at_edge(row, way, cloud):
+    """Whether the sheets of samples `row` (r,) end there: go on to one side alone of planes with normals (r,3)."""
+    other = cloud.neighbours[row]
+    step, _ = _steps(row, other, cloud)
+    sheet = one_sheet(step, cloud.normals[row, None], cloud.normals[other])
+    off = np.where(sheet, np.einsum("rki,ri->rk", step, way), 0.0)
+    return np.minimum(off.max(axis=1), -off.min(axis=1)) < _EDGE * cloud.spacing[row]
+
+
+def _steps(row, other, cloud):
+    """Steps (r,k,3) from samples `row` (r,) to `other` (r,k), and their lengths (r,k)."""
+    step = cloud.points[other] - cloud.points[row, None]
+    return step, np.linalg.norm(step, axis=2)

@@ -21,7 +21,7 @@ def can(rings: int, around: int = 128, lids=(0.0, 2.0)) -> np.ndarray:
     return np.concatenate([*wall, *(each + np.array([0, 0, end]) for end in lids for each in lid)])
 
 
-@pytest.mark.parametrize(("rings", "turn"), [(4, 0), (6, 1), (10, 2)])
+@pytest.mark.parametrize(("rings", "turn"), [(4, 0), (6, 1), (10, 2), (12, 3)])
 def test_cylinders_of_few_rings_meet_their_lids(rings, turn):
     """Rings 4 to 14 steps apart; a slit was left beside each lid, which came off."""
     points = can(rings)
