@@ -21,6 +21,7 @@ _IN_PLANE = 0.2  # of its distance, that a sample on the crease may be off the p
 _FOLDED = 0.7  # largest |n_i . n_j| of the two sheets
 _ALONG = 0.8  # least cosine between the line and the crease
 _EDGE = 0.3  # local spacings, at most, that the other sheet goes on past it
+_SHARE, _FEWEST = 0.3, 6  # of the samples of a line, at least, that find a crease; of a relief's contours some do
 _MOST = 256  # samples among which lines and the crease are looked for
 _CHUNK = 512  # samples
 
@@ -56,15 +57,20 @@ class Added:
 def samples_beside_creases(rims: Rims, cloud: Cloud, progress=None) -> Added:
     """Samples to be added where sheets of lines end at creases: where a line has another one behind it and none ahead,
     but, in its plane and about as far as that, a sample at the edge of a sheet that meets this plane along the line."""
-    row, way = _free_sides(rims, cloud)
-    found = np.empty(len(row), np.int64)
+    on_lines = np.flatnonzero(cloud.lines.number >= 0)
 
     def look(part):
-        return _across(row[part], way[part], cloud)
+        row, way = _free_sides(on_lines[part], rims, cloud)
+        found = _across(row, way, cloud)
+        return row[found >= 0], found[found >= 0]
 
-    for part, other in in_order(look, Progress.of(progress).chunks(len(row), _CHUNK)):
-        found[part] = other
-    row, found = row[found >= 0], found[found >= 0]
+    parts = Progress.of(progress).chunks(len(on_lines), _CHUNK)
+    pairs = [(np.empty(0, np.int64),) * 2, *(pair for _, pair in in_order(look, parts))]
+    row, found = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    line = cloud.lines.number
+    finding, all_ = (np.bincount(line[some], minlength=len(cloud)) for some in (row, on_lines))
+    many = (finding >= np.maximum(_FEWEST, _SHARE * all_))[line[row]]
+    row, found = row[many], found[many]
     step = cloud.points[row] - cloud.points[found]
     nearest = np.lexsort([row_dots(step, step), found])
     nearest = nearest[np.unique(found[nearest], return_index=True)[1]]
@@ -74,10 +80,10 @@ def samples_beside_creases(rims: Rims, cloud: Cloud, progress=None) -> Added:
     return Added(places, unit(own - row_dots(own, way)[:, None] * way), found, row)
 
 
-def _free_sides(rims, cloud):
-    """Samples on lines, (r,), and unit ways (r,3) across these in the tangent plane in which no sample around lies on
-    their sheet, and no patch covers a gap."""
-    row = np.repeat(np.flatnonzero(cloud.lines.number >= 0), 2)
+def _free_sides(row, rims, cloud):
+    """Of samples `row` on lines, those (r,) and unit ways (r,3) across these in the tangent plane in which no sample
+    around lies on their sheet, and no patch covers a gap."""
+    row = np.repeat(row, 2)
     way = unit(np.cross(cloud.normals[row], cloud.lines.along[row]))
     way[1::2] *= -1
     towards = row_dots(way, rims.outward[row])
