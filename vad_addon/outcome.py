@@ -166,47 +166,24 @@ def compute(task: Task, folder: Path, progress=None) -> Outcome:
         progress = Progress.of(progress)
         if task.volume:
             return _extracted(task, progress)
-        if task.until == COST:
-            return _measured(task, progress)
         return _reconstructed(task, folder, progress) if task.until == ALL else _begun(task, progress)
     except MemoryError as error:
         raise VADError("Out of memory: lower the resolution, or give fewer points") from error
 
 
-def _measured(task, progress):
-    """The samples without strays, and what a run's cost depends on. Neither steps of depth nor noise are mended."""
-    start = time.perf_counter()
-    samples = prepare_samples(task.points, progress.part(0.0, 0.3, "points")).in_spatial_order()
-    samples, _ = clean(samples, replace(task.settings, denoise=0.0), progress.part(0.3, 0.5, "cleaning"))
-    spacing = local_spacing(samples.points, progress.part(0.5, 0.9, "cleaning"))
-    return Outcome(
-        points=samples.given,
-        source_index=samples.source_index,
-        normals=None,
-        confidence=None,
-        surface=None,
-        sheet=None,
-        volume=None,
-        origin=centre(samples.given),
-        cell=float(np.median(spacing)) * samples.scale,
-        shape=(),
-        report="{}",
-        warnings=samples.warnings,
-        seconds=time.perf_counter() - start,
-        spacing=spacing * samples.scale,
-        noisy=bool(looks_noisy(samples.points, spacing)),
-    )
-
-
 def _begun(task, progress):
-    """The first stages alone."""
-    start = time.perf_counter()
-    share = 1.0 if task.until == CLEANING else 0.5
-    samples = prepare_samples(task.points).in_spatial_order()
-    samples, report = clean(samples, task.settings, progress.part(0.0, share, "cleaning"))
-    spacing = local_spacing(samples.points)
+    """The first stages alone. For what a run's cost depends on, neither steps of depth nor noise are mended."""
+    start, settings, measured = time.perf_counter(), task.settings, {}
+    if task.until == COST:
+        settings = replace(settings, denoise=0.0)
+    share = 0.5 if task.until == NORMALS else 1.0
+    samples = prepare_samples(task.points, progress.part(0.0, 0.3 * share, "points")).in_spatial_order()
+    samples, report = clean(samples, settings, progress.part(0.3 * share, 0.7 * share, "cleaning"))
+    spacing = local_spacing(samples.points, progress.part(0.7 * share, share, "cleaning"))
     row = samples.given_order()
     normals, confidence, ignored = None, None, ()
+    if task.until == COST:
+        measured = {"spacing": spacing[row] * samples.scale, "noisy": bool(looks_noisy(samples.points, spacing))}
     if task.until == NORMALS:
         constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
         part = progress.part(share, 1.0, "normals")
@@ -226,6 +203,7 @@ def _begun(task, progress):
         report=report_json({"settings": asdict(task.settings), "cleaning": report}),
         warnings=(*samples.warnings, *ignored),
         seconds=time.perf_counter() - start,
+        **measured,
     )
 
 
