@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 _DISTINCT = 1e-5  # below this the two largest eigenvalues are too close for the closed form
+_SHORTEST = np.sqrt(np.finfo(float).tiny)  # of vectors, below which squared lengths are lost
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -115,8 +116,13 @@ def row_dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (...,k) made unit along the last axis; those without a length stay zero."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(float).tiny)
+    """Vectors (...,k) made unit along the last axis; those shorter than 1e-154 come out as hardly more than zero."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _SHORTEST)
+
+
+def unit_columns(a: np.ndarray) -> np.ndarray:
+    """The same of vectors stored component by component, (3,m)."""
+    return a / np.maximum(lengths(a), _SHORTEST)
 
 
 def shortened(steps: np.ndarray, longest: float | np.ndarray) -> np.ndarray:

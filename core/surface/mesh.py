@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..linalg import cross, lengths
+from ..linalg import cross, lengths, unit_columns
 from ..lookup import numbered
 from ..parallel import over_rows
 from ..parts import connected_parts
@@ -159,13 +159,12 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
         face[:, part] = cross(*(places[b] - places[a] for a, b in zip(start, end, strict=True)))
 
     def compare(part):
-        unit = face[:, part] / np.maximum(lengths(face[:, part]), np.finfo(float).tiny)
+        unit = unit_columns(face[:, part])
         for corner, found in zip(corners, cosine, strict=True):
             found[part] = np.einsum("if,if->f", unit, normal.take(corner[part], axis=1))
 
     over_rows(turn, len(faces), AT_ONCE)
-    normal = np.stack([sum(np.bincount(corner, x, n) for corner in corners) for x in face])
-    normal = normal / np.maximum(lengths(normal), np.finfo(float).tiny)
+    normal = unit_columns(np.stack([sum(np.bincount(corner, x, n) for corner in corners) for x in face]))
     over_rows(compare, len(faces), AT_ONCE)
     least = np.ones(n)
     for corner, found in zip(corners, cosine, strict=True):

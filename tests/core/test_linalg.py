@@ -16,6 +16,8 @@ from core.linalg import (
     shortened,
     solve_positive,
     tangent_frames,
+    unit,
+    unit_columns,
 )
 from tests.shapes import random_rotation
 
@@ -44,6 +46,18 @@ def residual(tensors):
 def test_outer_is_v_v_transposed(random):
     v = random.normal(size=(4, 5, 3))
     np.testing.assert_allclose(matrices(outer(v).reshape(-1, 6)), (v[..., None] * v[..., None, :]).reshape(-1, 3, 3))
+
+
+@pytest.mark.parametrize("size", [1e-320, 1e-200, 1e-169, 1e-155, 1e-150, 1e-3, 1e150])
+def test_unit_vectors_are_no_longer_than_one(size, random):
+    """Nor those whose squared length is no number above zero; all others are as long as that."""
+    v = size * random.normal(size=(100, 3))
+    for found in (unit(v), unit_columns(v.T).T):
+        length = np.linalg.norm(found, axis=1)
+        assert np.isfinite(found).all() and (length < 1 + 1e-12).all()
+        if size >= 1e-150:
+            np.testing.assert_allclose(length, 1, rtol=1e-12)
+    assert not unit(np.zeros(3)).any() and not unit_columns(np.zeros((3, 2))).any()
 
 
 def test_random_tensors(random):

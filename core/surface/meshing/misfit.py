@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import dots, lengths
+from ...linalg import dots, lengths, unit_columns
 from ..mesh import Mesh, at_corners, face_normals
 
 _TORN = 0.07  # cells, mean distance of the samples to a mesh, above which it is torn
@@ -47,8 +47,7 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     if not len(mesh.faces):
         return np.full(1, np.inf)
     corners = np.stack(at_corners(mesh.vertices, mesh.faces))
-    centre, normal = corners.mean(axis=0), face_normals(*corners)
-    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    centre, normal = corners.mean(axis=0), unit_columns(face_normals(*corners))
     radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
     points = points[:: max(len(points) // _ASKED, 1)]
     tree = KDTree(centre.T, balanced_tree=False, compact_nodes=False)

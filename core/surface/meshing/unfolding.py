@@ -5,7 +5,7 @@ from scipy.sparse import coo_matrix
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import dots, lengths
+from ...linalg import dots, lengths, unit_columns
 from ...parts import connected_parts
 from ..mesh import Mesh, at_corners, face_normals
 
@@ -100,8 +100,7 @@ def _folded(mesh, cut):
     `cut` off, (v,) bool; and which vertices are on folds between many faces, (v,) bool."""
     a, b, c = at_corners(mesh.vertices, mesh.faces)
     normal, sides = face_normals(a, b, c), (b - a, c - b, a - c)
-    double = lengths(normal)
-    normal /= np.maximum(double, np.finfo(float).tiny)
+    double, normal = lengths(normal), unit_columns(normal)
     flat = double <= _FLAT * np.max([dots(side, side) for side in sides], axis=0)
     (one, other), low, high, count = mesh.edges.beside, mesh.edges.low, mesh.edges.high, mesh.edges.count
     cosine = dots(*(normal.take(face, axis=1) for face in (one, other))) * np.where(mesh.edges.alike, 1, -1)

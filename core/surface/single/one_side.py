@@ -5,7 +5,7 @@ import numpy as np
 from ...field.blocks import Blocks, at_nodes
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
-from ...linalg import lengths, symmetric
+from ...linalg import lengths, symmetric, unit_columns
 from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.pieces import pieces_with_samples
 
@@ -24,8 +24,7 @@ def one_side(cover: Mesh, signed: np.ndarray | Blocks, surface: LocalSurface, gr
     """
     corners = np.stack(at_corners(cover.vertices, cover.faces))
     middle, normal = corners.mean(axis=0), face_normals(*corners)
-    area = lengths(normal)
-    normal /= np.maximum(area, np.finfo(float).tiny)
+    area, normal = lengths(normal), unit_columns(normal)
     side = np.zeros(len(cover.faces))
     for off in _OFF:
         found = at_nodes(signed, grid.nearest_nodes((middle + off * grid.spacing * normal).T))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...linalg import dots, lengths, symmetric
+from ...linalg import dots, symmetric, unit_columns
 from ...parts import connected_parts
 from ..mesh import Mesh, at_corners, face_normals
 from ..signs.spreading import spread_signs, spread_strongest
@@ -52,7 +52,7 @@ def _spread(relation, pair, normal, beside):
     this leaves, by the smoothest. Where all are wound alike that makes every sign 1."""
     if (relation > 0).all():
         return np.ones(normal.shape[1]), connected_parts(*pair, normal.shape[1])
-    unit = normal / np.maximum(lengths(normal), np.finfo(float).tiny)
+    unit = unit_columns(normal)
     cosine = relation * dots(*(unit.take(face, axis=1) for face in pair))
     smooth = (cosine > _SMOOTH) & ~beside[pair].any(axis=0)
     links = symmetric(relation[smooth], *pair[:, smooth], normal.shape[1])

@@ -18,6 +18,7 @@ from ..mesh import Mesh, at_corners, face_normals
 from .rim_corners import Border
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
+_CANCELLED = 1e-6  # cells, what is left at most of ways out of faces that lie opposite each other
 _LENGTH = 1.5  # smoothing length, local spacings
 _FARTHEST = 0.3  # local spacings, no border moves further
 _FREE = 0.25  # local spacings to either side of a corner, where borders turn as they like
@@ -33,7 +34,7 @@ def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     """The mesh's vertices (v,3) with those at borders where they fall on the surface from a cell further out: at its
     rims, where these are that near, and a cell and a half off at most."""
     way = _outward(mesh)
-    loop = np.flatnonzero(way.any(axis=1))
+    loop = np.flatnonzero(np.linalg.norm(way, axis=1) > _CANCELLED * cell)
     if not len(loop):
         return mesh.vertices
     way, axis, vertices = way[loop], _axes(mesh, loop), mesh.vertices.copy()

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
-from ...linalg import dots, lengths
+from ...linalg import dots, unit_columns
 from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.misfit import chamfer
 from ..meshing.pieces import pieces_of
@@ -56,8 +56,7 @@ def with_thin_walls(sheet: Mesh, unoriented: int, cover: Mesh, surface: LocalSur
 def _has_other_layer(cover, asked, middles, cell):
     """Which faces of a double cover, of those `asked` for, have one of its other layer flush with them, (k,) bool."""
     near = middles.query(middles.data[asked], k=range(2, 2 + min(_AROUND, middles.n - 1)), workers=-1)[1]
-    normal = face_normals(*at_corners(cover.vertices, cover.faces))
-    normal /= np.maximum(lengths(normal), np.finfo(float).tiny)
+    normal = unit_columns(face_normals(*at_corners(cover.vertices, cover.faces)))
     step = (middles.data[near] - middles.data[asked, None]).transpose(2, 0, 1)
     own = normal[:, asked, None]
     flush = np.abs(dots(step, own)) < _FLUSH * cell
