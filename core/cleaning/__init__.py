@@ -1,7 +1,8 @@
 """Before stage one: strays are dropped and noise is taken off; :mod:`.clean` does both.
 
 surroundings, detached, far_parts, off_wires, outliers : which samples are strays
-anchors, flat_patches, roughness, thin_walls, noise    : which are noisy
+anchors, flat_patches, roughness, thin_walls, voxels   : what looks noisy, and what only seems so or surely is
+noise                                                  : which are noisy
 noise_level, positions, depth_steps                    : how noisy, and where those lie without the noise
 offsets                                                : the paper's own way, the reference beside that
 """

@@ -30,7 +30,9 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 1.0))
     if done:
         samples = samples.moved(moved)
-        done |= {name: done[name] * samples.scale for name in ("noise", "mean_move")}
+        done |= {name: done[name] * samples.scale for name in ("noise", "mean_move", "voxel") if name in done}
+        if "voxel" in done:
+            samples = replace(samples, warnings=(*samples.warnings, _said_of_voxels(done["voxel"])))
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
 
 
@@ -42,6 +44,13 @@ def _said_of_dropped(dropped, points):
         return said
     larger = f"the grid's cells would be {every / rest:.2g} times as large with them"
     return f"{said}, some so far from the rest that {larger}; with outliers=False they stay"
+
+
+def _said_of_voxels(side):
+    return (
+        f"points are in steps of {side:.2g}, as voxels and whole heights are: they were moved off these; with "
+        "denoise=0 they stay"
+    )
 
 
 def _off_steps_of_depth(samples, strength, progress):

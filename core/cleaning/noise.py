@@ -1,5 +1,7 @@
 """Which samples are noisy."""
 
+from itertools import chain
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -11,6 +13,7 @@ from .anchors import SMOOTHING, nearest_anchor, some_samples
 from .flat_patches import shows_flat_patches
 from .roughness import least_part, roughness
 from .thin_walls import is_shift, two_sheets
+from .voxels import Voxels, find_voxels
 
 MINIMUM_SAMPLES = 100  # fewer say nothing about noise
 
@@ -21,15 +24,19 @@ _CORE_AGREED = 0.87  # and its normals agree less than this; creases and thin sh
 _PATCHES, _PATCH = 16, 300  # patches of a large cloud in which normals are asked, samples in each
 _MIDDLE = 100  # of these, those whose neighbours are all there
 _SWEEPS = 20  # more change the median confidence by less than .0005 where it is above .9
+_STAIRS, _UNEVEN = 0.2, 0.03  # share of samples in a region of voxels, and local spacings off quadrics, at least
 
 
 def looks_noisy(points, spacing) -> bool:
-    """Whether samples (n,3) with local spacing (n,) are as far off quadrics as noisy ones are; quick, and less
-    sure than :func:`noisy_samples`, which asks the normals as well."""
-    return len(points) >= MINIMUM_SAMPLES and roughness(points, spacing, 0, Progress()).whole
+    """Whether samples (n,3) with local spacing (n,) are as far off quadrics as noisy ones are, or voxels; quick, and
+    less sure than :func:`noisy_samples`, which asks the normals as well."""
+    if len(points) < MINIMUM_SAMPLES:
+        return False
+    found, voxels = roughness(points, spacing, 0, Progress()), find_voxels(points, spacing)
+    return found.whole or (voxels is not None and _around_stairs(found, voxels).any())
 
 
-def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
+def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels | None = None) -> np.ndarray:
     """(n,) bool: which samples (n,3) with local spacing (n,) are noisy, rather than too few for some of the detail.
 
     Judged by how far each sample lies off the quadric through its neighbours, in local spacings. Noise looks alike from
@@ -41,19 +48,24 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None) -> np.ndarray:
     look so throughout, or around a core that is well above all limits and not small: creases and thin sheets look noisy
     in places. Nothing is noisy where samples show two sheets that are hardly farther apart than the noise would be, see
     :mod:`.thin_walls`, or that they lie on flat faces, see :mod:`.flat_patches`.
+
+    Samples of `voxels` lie in layers, which show neither of that; these are noisy around stairs as well.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
         return clean
     progress = Progress.of(progress)
     found = roughness(points, spacing, seed, progress)
-    for suspect, part in _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.9)):
+    parts = _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.9))
+    if voxels is not None:
+        parts = chain([(_around_stairs(found, voxels), progress.part(0.1, 0.1))], parts)
+    for suspect, part in parts:
         if suspect.any():
             level, beside = np.median(found.relative[suspect]), suspect[found.region[:, :SMOOTHING]]
             amid = suspect & beside.all(axis=1)
             amid = found.anchors[amid if amid.any() else suspect]
             suspect = beside.any(axis=1)  # noise left beside would stand out as a seam
-            if not _seems_only(points, spacing, found.anchors[suspect], amid, level, part):
+            if voxels is not None or not _seems_only(points, spacing, found.anchors[suspect], amid, level, part):
                 break
     else:
         return clean
@@ -82,6 +94,13 @@ def _noisy_anchors(points, spacing, found, seed, progress):
     if found.suspect.sum() >= least_part(found.anchors):
         parts = parts | _around_loud_cores(found, _agreement(points, spacing, progress.part(0.4, 0.8)))
     yield parts, progress.part(0.8, 1.0)
+
+
+def _around_stairs(found, voxels):
+    """Which anchors are in regions of stairs, or beside one in such, (m,) bool. Stairs all of which lie on one plane
+    are that plane."""
+    stairs = voxels.stairs(found.anchors)[found.region].mean(axis=1) > _STAIRS
+    return (stairs & (found.relative > _UNEVEN))[found.region].any(axis=1)
 
 
 def _around_loud_cores(found, confidence):

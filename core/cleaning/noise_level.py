@@ -39,14 +39,16 @@ class Noise:
     neighbours: np.ndarray
 
 
-def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
-    """Noise level and best neighbourhood of samples (n,3), n > 12; for those marked in `noisy`, (n,) bool, where given.
+def estimate_noise(points, seed: int = 0, progress=None, noisy=None, least: float = 0.0) -> Noise:
+    """Noise level and best neighbourhood of samples (n,3), n > 12; for those marked in `noisy`, (n,) bool, where given;
+    the level is known to be `least`, at least: terraces of voxels show less to neighbourhoods as small as they are.
 
     A quadric through the k nearest, within a radius r, misses the sample that it leaves out by the noise, but for the
     share f = (1.47 level / r)^1.5 that it follows, and by what it cannot bend to. The level is read off the smallest
     neighbourhood wide enough to see most of the noise. Of the square of what a fit misses, the rest is bent away; that
-    may come out negative, as it is its growth that tells. Every region takes the neighbourhood of least risk, the
-    squared error that is expected of its quadric (after C. Stein, Annals of Statistics 9(6), 1981):
+    may come out negative, as it is its growth that tells, unless the level is the least. Every region takes the
+    neighbourhood of least risk, the squared error that is expected of its quadric (after C. Stein, Annals of Statistics
+    9(6), 1981):
 
         bent^2 + level^2 (3 <leverage> + f^2)
     """
@@ -56,32 +58,33 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None) -> Noise:
     sizes, clusters = [k for k in LADDER if k < len(points)], Clusters(points)
     fits = nested_quadrics(points, anchors, sizes, progress.part(0.0, 0.6))
     seen = [errors for _, errors in in_order(partial(_regional_errors, region=region), fits)]
-    level, best, drowned = _of_least_risk(seen, counted)
+    level, best, drowned = _of_least_risk(seen, counted, least)
     for i, k in enumerate(_WIDER):
         if (best == len(seen) - 1).mean() < _ASKED or k > (_MOST if drowned else _PART) * len(points):
             break
         part = progress.part(0.6 + 0.3 * i / len(_WIDER), 0.6 + 0.3 * (i + 1) / len(_WIDER))
         seen.append(_regional_errors(fit_quadrics(points, anchors, k, part, clusters), region))
         sizes.append(k)
-        level, best, drowned = _of_least_risk(seen, counted)
+        level, best, drowned = _of_least_risk(seen, counted, least)
     neighbours = np.exp(np.log(sizes)[best][region[:, :SMOOTHING]].mean(axis=1))
 
     nearest = nearest_anchor(points, points[anchors], progress.part(0.9, 1.0))
     return Noise(level[nearest], neighbours[nearest])
 
 
-def _of_least_risk(seen, counted):
-    """Level of each region and its neighbourhood of least risk, (m,), from the errors of each neighbourhood; some of
-    the regions are `counted`, (m,) bool, for the typical level."""
+def _of_least_risk(seen, counted, least):
+    """Level of each region, the `least` or more, and its neighbourhood of least risk, (m,), from the errors of each
+    neighbourhood; some of the regions are `counted`, (m,) bool, for the typical level."""
     missed, leverage, radius = np.moveaxis(np.array(seen), 1, 0)
     levels = missed * np.sqrt(1.0 - leverage)
     sound = _before_wrapping(levels)
     last = sound.sum(axis=0) - 1
     level = in_full(levels, radius, _first(sound & (radius >= _SEEN * missed), last))
     level = np.minimum(level, in_full(levels, radius, _first(sound & (radius >= _USABLE * level), last)))
-    level = np.minimum(level, _UNEVEN * np.median(level[counted]))
+    level = np.maximum(np.minimum(level, _UNEVEN * np.median(level[counted])), least)
     followed = _followed(level, radius)
     bent = levels**2 - (level * (1 - followed)) ** 2
+    bent[:, level == least] = np.maximum(bent[:, level == least], 0.0)
     risk = bent + level**2 * (_FREEDOM * leverage + followed**2)
     narrow = np.arange(len(seen))[:, None] < _first(sound & (radius >= _LEAST * level), last)
     risk[narrow | ~sound] = np.inf

@@ -14,6 +14,7 @@ from ..progress import Progress
 from ..settings import Settings
 from .noise import noisy_samples
 from .noise_level import LADDER, estimate_noise
+from .voxels import find_voxels
 
 LONGEST_MOVE = 4.0  # standard deviations of the noise
 
@@ -35,15 +36,17 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     progress, given, points = Progress.of(progress), points, finite_points(points)
     spacing = spacing_of(points, spacing)
     strength = Settings(denoise=strength).denoise
-    if len(points) <= LADDER[0]:
+    if len(points) <= LADDER[0] or strength == 0:
         return given, {}
+    voxels = find_voxels(points, spacing, seed)
     if strength == "auto":
-        noisy, strength = noisy_samples(points, spacing, seed, progress.part(0.0, 0.1)), 1.0
+        noisy, strength = noisy_samples(points, spacing, seed, progress.part(0.0, 0.1), voxels), 1.0
     else:
-        noisy = np.full(len(points), strength > 0)
+        noisy = np.ones(len(points), bool)
     if not noisy.any():
         return given, {}
-    noise = estimate_noise(points, seed, progress.part(0.1, 0.4), noisy)
+    least = 0.0 if voxels is None else voxels.noise
+    noise = estimate_noise(points, seed, progress.part(0.1, 0.4), noisy, least)
     sizes = [_rounded(share * noise.neighbours, len(points)) for share in _SHARES]
     moved = points
     for turn, neighbours in enumerate(sizes):
@@ -55,7 +58,7 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
         "neighbours": [int(k) for k in np.percentile(sizes[0][noisy], (5, 50, 95), method="nearest")],
         "mean_move": float(np.linalg.norm(step[noisy], axis=1).mean()),
     }
-    return points + step, counts
+    return points + step, counts if voxels is None else counts | {"voxel": voxels.side}
 
 
 def _rounded(neighbours, n):

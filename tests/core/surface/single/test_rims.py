@@ -110,9 +110,7 @@ def test_faces_that_lie_opposite_each_other_have_no_way_out_between_them():
     """Of the ways out of both only rounding is left, which tells no direction."""
     turn = np.pi * np.array([0.1, 0.3, 1.1, 1.3])
     around = 0.1 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    bow = Mesh(
-        np.concatenate([np.full((1, 3), [0.1, 0.1, 0]), around + [0.1, 0.1, 0]]), np.array([[0, 1, 2], [0, 3, 4]])
-    )
+    bow = Mesh(np.array([0.1, 0.1, 0]) + np.concatenate([np.zeros((1, 3)), around]), np.array([[0, 1, 2], [0, 3, 4]]))
     cell = 0.02
     at = at_rims(bow, flat_surface(), cell)
     np.testing.assert_array_equal(at[0], bow.vertices[0])

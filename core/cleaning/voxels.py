@@ -1,0 +1,102 @@
+"""Voxels: samples on a lattice hardly finer than they are dense, each off the surface by up to half of a step.
+
+What a scan that was binned, a segmented volume or a grid of occupied cells leaves has more noise than any rounding, but
+in layers, which look like thin walls or flat faces, or in terraces wider than the neighbours that noise is seen in.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations, product
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from .anchors import some_samples
+
+_LOOKED_AT, _NEAREST = 300, 8  # samples, and the nearest to each, whose offsets are looked at
+_INDEPENDENT = 0.1  # volume over that of a right-angled box, at least, of offsets that span a lattice
+_WHOLE = 0.02  # steps, that an offset is off whole numbers of them, at most
+_MOST = 0.9  # of the offsets, at least, are no further off; strays have others
+_TWINS, _ALIKE = 5, 1e-3  # as many others are like an offset that spans the lattice, to so much of a typical length
+_COARSE = 0.25  # local spacings, the side at least
+_NUMBERED = np.array([1, 1 << 21, 1 << 42])  # times places: one number for each, two million on a side
+_ROUNDED = 1 / np.sqrt(12)  # standard deviation of errors that are uniform over a step
+
+
+@dataclass(frozen=True)
+class Voxels:
+    """The voxels that samples are the centres or corners of, in whatever turn.
+
+    edges : (3,3) float64, the vectors along them     place : (n,3) int64, of the samples, in edges
+    """
+
+    edges: np.ndarray
+    place: np.ndarray
+
+    @cached_property
+    def side(self) -> float:
+        """The length of the longest edge; where no two samples are above each other along one of the edges, of that:
+        heights over a grid are rounded alone."""
+        length = np.linalg.norm(self.edges, axis=1)
+        above = [len(np.unique(np.delete(self.place, k, axis=1) @ _NUMBERED[:2])) for k in range(3)]
+        return float(length[np.argmax(above)] if max(above) == len(self.place) else length.max())
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the samples."""
+        return _ROUNDED * self.side
+
+    def stairs(self, rows) -> np.ndarray:
+        """Which of the samples `rows` (m,) have another beside an edge of their voxel, but none beside the faces that
+        this edge is between, (m,) bool: where terraces end that a surface between the voxels leaves. Boxes, and
+        surfaces that go through voxels, have hardly any."""
+        taken, own = np.sort(self.place @ _NUMBERED), self.place[rows]
+
+        def holds(step):
+            asked = (own + step) @ _NUMBERED
+            return taken[np.minimum(np.searchsorted(taken, asked), len(taken) - 1)] == asked
+
+        found = np.zeros(len(rows), bool)
+        for one, other in combinations(np.eye(3, dtype=int), 2):
+            for a, b in product((-one, one), (-other, other)):
+                found |= holds(a + b) & ~holds(a) & ~holds(b)
+        return found
+
+
+def find_voxels(points, spacing, seed: int = 0) -> Voxels | None:
+    """The voxels that samples (n,3) with local spacing (n,) are of; None where they are of none.
+
+    The three shortest offsets between neighbours that are independent, and recur, span the lattice that these lie on,
+    if they lie on any; then the others are whole numbers of them.
+    """
+    rows = some_samples(points, min(_LOOKED_AT, len(points)), seed)
+    beside = KDTree(points).query(points[rows], k=range(2, 2 + min(_NEAREST, len(points) - 1)))[1]
+    offset = (points[beside] - points[rows, None]).reshape(-1, 3)
+    length = np.linalg.norm(offset, axis=1)
+    twins = KDTree(offset).query(offset, k=_TWINS + 1, workers=-1)[0][:, _TWINS] < _ALIKE * np.median(length)
+    edges = _shortest_independent(offset[twins][np.argsort(length[twins], kind="stable")])
+    if edges is None:
+        return None
+    for i, j in combinations(range(3), 2):
+        edges[j] -= np.rint(edges[i] @ edges[j] / (edges[i] @ edges[i])) * edges[i]
+    steps = offset @ np.linalg.inv(edges)
+    whole = np.rint(steps)
+    on = np.abs(steps - whole).max(axis=1) < _WHOLE
+    if on.mean() < _MOST:
+        return None
+    edges = np.linalg.lstsq(whole[on], offset[on], rcond=None)[0]
+    found = Voxels(edges, np.rint((points - points[0]) @ np.linalg.inv(edges)).astype(np.int64))
+    return found if found.side >= _COARSE * np.median(spacing) else None
+
+
+def _shortest_independent(offset):
+    """The first three of vectors (m,3) that are independent, (3,3); None where there are none."""
+    if not len(offset):
+        return None
+    unit = offset / np.linalg.norm(offset, axis=1, keepdims=True)
+    across = np.cross(unit[0], unit)
+    aside = np.flatnonzero(np.linalg.norm(across, axis=1) > _INDEPENDENT)
+    if not len(aside):
+        return None
+    out = np.flatnonzero(np.abs(unit @ across[aside[0]]) > _INDEPENDENT)
+    return offset[[0, aside[0], out[0]]] if len(out) else None
