@@ -20,7 +20,7 @@ from .meshing.misfit import chamfer, misfit
 from .meshing.pieces import pieces_touch, pieces_with_samples
 from .signs.sides import may_be_closed
 from .single.routes import BETTER, ROUGH
-from .single.single_layer import SingleLayer
+from .single.single_layer import SHOWN, SingleLayer
 
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
 SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone
@@ -96,9 +96,10 @@ class Choice:
         return worst > _MERGED or (worst > ROUGH and self.meetings.side_by_side and self.single.of_sides is not None)
 
     def _is_closer(self):
-        """Whether both sides of the single layer are closer to the surface than the extracted double cover."""
+        """Whether both sides of the single layer are closer to the surface than the extracted double cover, and do not
+        miss ends of it that this shows."""
         both, cover = (chamfer(mesh, self.local, self.grid.spacing) for mesh in (self.both_sides, self.extracted))
-        return both < cover
+        return both < cover and self.single.misfit[1] - self.extracted_fit[1] <= SHOWN
 
     @cached_property
     def both_sides(self) -> Mesh:

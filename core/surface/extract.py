@@ -22,6 +22,10 @@ from .single.routes import BETTER, boundary_of_inside
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said
+_SAID_OF_RAGS = (
+    "the single layer is torn in places, as where thin parts have few points or cells across; give more points, raise "
+    "the resolution, or use the double cover"
+)
 
 
 @dataclass(frozen=True)
@@ -116,6 +120,8 @@ def extract_surfaces(
         elif (missed := fit[1]) > _SOME:
             other = "" if kind == "both" and choice.cover_fit[1] > _SOME else ", or use the double cover"
             warnings.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
+        elif fit[0] > 1 and (meshes["single"].edges.count == 1).any():
+            warnings.append(_SAID_OF_RAGS)
         if unoriented:
             warnings.append(
                 f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "

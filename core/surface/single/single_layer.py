@@ -23,7 +23,7 @@ from ..signs.two_sides import two_sided
 from .routes import BETTER, ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
 from .thin_walls import with_thin_walls
 
-_SHOWN = 0.005  # of the samples, that one layer shows and another misses; fewer may be chance
+SHOWN = 0.005  # of the samples, that one layer shows and another misses; fewer may be chance
 
 
 def single_layer(
@@ -144,7 +144,7 @@ class SingleLayer:
         if not other.meetings.adds_to(self.meetings):
             return self
         (worst, missed), (others_worst, others_missed) = self.misfit, other.misfit
-        shows_more = missed - others_missed > _SHOWN and (worst > 1) == (others_worst > 1)
+        shows_more = missed - others_missed > SHOWN and (worst > 1) == (others_worst > 1)
         return other if others_worst < (1 if shows_more else BETTER) * worst else self
 
     def with_thin_walls(self) -> tuple[Mesh, int]:

@@ -7,7 +7,7 @@ from ...field.local_surface import LocalSurface
 from ...linalg import dots, unit_columns
 from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.misfit import chamfer
-from ..meshing.pieces import pieces_of
+from ..meshing.pieces import pieces_of, pieces_with_samples
 from .orientation import orient
 
 _TWICE = 1 / 3  # of the area of a piece, at most, with the other layer flush with it
@@ -50,7 +50,7 @@ def with_thin_walls(sheet: Mesh, unoriented: int, cover: Mesh, surface: LocalSur
     if not walls:
         return sheet, unoriented
     rest, unoriented = orient(sheet.part(~np.isin(of, walls)))
-    return rest.joined(cover.part(np.isin(piece, walls))), unoriented
+    return pieces_with_samples(rest.joined(cover.part(np.isin(piece, walls))), surface.tree, cell), unoriented
 
 
 def _has_other_layer(cover, asked, middles, cell):

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from core import Mesh, Settings, both_sides, reconstruct
+from core.linalg import tangent_frames
 from core.surface import choice
 from core.surface.double.layers import HAIR
 from core.surface.meshing import misfit
@@ -360,6 +361,30 @@ def test_a_run_leaves_a_torn_sheet_alone(monkeypatch):
         monkeypatch.setattr(choice, "chamfer", lambda *_, told=iter([both, cover]): next(told))
         run = reconstruct(shapes.hemisphere(800), Settings(resolution=48, surface="both"))
         assert is_of_sheet(run) == (both < cover)
+
+
+def scattered_twigs(n, count, radius):
+    """Tubes from the origin's neighbourhood outwards."""
+    rng = np.random.default_rng(0)
+    way = rng.normal(size=(count, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    of, along, turn = rng.integers(count, size=n), rng.uniform(0.1, 1, n), rng.uniform(0, 2 * np.pi, n)
+    one, other = tangent_frames(way)[of].transpose(1, 0, 2)
+    return along[:, None] * way[of] + radius * (np.cos(turn)[:, None] * one + np.sin(turn)[:, None] * other)
+
+
+def test_of_torn_ones_the_cover_that_misses_none_of_the_surface_is_taken():
+    """Twigs of few points around them, of which the single layer misses some and is in shreds elsewhere."""
+    run = reconstruct(scattered_twigs(1500, 20, 0.02), Settings(resolution=64, surface="both"))
+    assert not is_of_sheet(run)
+    assert len(shapes.components(run.surface)) == 1
+
+
+def test_shreds_are_told():
+    run = reconstruct(scattered_twigs(3000, 30, 0.05), Settings(resolution=64, surface="single"))
+    assert any("single layer is torn" in warning for warning in run.report["warnings"])
+    whole = reconstruct(scattered_twigs(3000, 20, 0.02), Settings(resolution=64, surface="single"))
+    assert whole.report["warnings"] == []
 
 
 @pytest.mark.parametrize("pages", [[0, 25, 50, 180], [0, 10, 180, 190]])
