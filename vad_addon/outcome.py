@@ -167,6 +167,8 @@ def compute(task: Task, folder: Path, progress=None) -> Outcome:
         if task.volume:
             return _extracted(task, progress)
         return _reconstructed(task, folder, progress) if task.until == ALL else _begun(task, progress)
+    except VADError:  # some are memory errors, too, with a reason of their own
+        raise
     except MemoryError as error:
         raise VADError("Out of memory: lower the resolution, or give fewer points") from error
 

@@ -244,6 +244,12 @@ def test_a_failure_on_the_way_leaves_nothing_behind(blender, folder, scan, exten
     assert not list(folder.rglob("*.vdb"))
 
 
+def test_a_run_beyond_the_memory_limit_says_what_it_needs_and_what_to_do(blender, scan):
+    said = r"resolution 512 needs about \d+ MiB; 64 MiB may be used; use resolution \d+ or less, or raise memory_limit"
+    with pytest.raises(RuntimeError, match=said):
+        blender.ops.vad.reconstruct(resolution=512, memory_limit="64")
+
+
 def test_without_openvdb_the_other_results_are_delivered(blender, folder, run, scan, extension, monkeypatch, capfd):
     missing = extension("core.errors").MissingDependency("OpenVDB is missing")
 
