@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from ..core.errors import VADError
-from .outcome import Outcome, Task
+from .outcome import OTHERWISE, Outcome, Task
 
 EXTENSION = Path(__file__).resolve().parent.parent
 
@@ -169,7 +169,4 @@ def _library_path():
 
 
 def _unusable(temporary, error):
-    return VADError(
-        f"The run cannot go on: {error.strerror or error} ({temporary}); free space there, or choose another folder "
-        "for temporary files in Blender's preferences"
-    )
+    return VADError(f"The run cannot go on: {error.strerror or error} ({temporary}); free space there, or {OTHERWISE}")

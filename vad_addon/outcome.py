@@ -27,6 +27,7 @@ from . import stored_field
 
 CLEANING, NORMALS, ALL = "cleaning", "normals", "all"  # how far a run goes
 COST = "cost"  # no run, but what its cost depends on
+OTHERWISE = "choose another folder for temporary files in Blender's preferences"  # where a run finds no room
 
 
 @dataclass(frozen=True)
@@ -220,7 +221,7 @@ def _reconstructed(task, folder, progress):
     warnings = list(result.report["warnings"])
     volume = folder / "field.vdb"
     try:
-        write_vdb(volume, replace(result.field, origin=result.field.origin - origin))
+        write_vdb(volume, replace(result.field, origin=result.field.origin - origin), otherwise=OTHERWISE)
     except VADError as error:
         warnings.append(f"No volume: {error}")
         volume = None

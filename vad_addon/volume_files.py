@@ -28,12 +28,14 @@ _before = {}  # the volumes that the save under way brings along, by `session_ui
 def adopt(name: str, temporary: Path, folder: Path | None = None) -> Path:
     """Copy the .vdb `temporary` to where it lasts, as a new file `name`.vdb, whole or not at all, and return its path.
 
-    folder : None for :func:`folder_in_use`
+    folder : beside a .blend, None for :func:`folder_in_use`
     Raises :class:`VADError` where the folder cannot be written.
     """
-    path = _reserve(name, folder or folder_in_use())
+    beside = folder is not None or bpy.data.is_saved
+    otherwise = "save the .blend in another folder" if beside else "save the .blend, or choose another cache folder"
+    path = _reserve(name, folder or folder_in_use(), otherwise)
     try:
-        with atomic_path(path) as copy:
+        with atomic_path(path, otherwise) as copy:
             shutil.copyfile(temporary, copy)
     except BaseException:
         path.unlink(missing_ok=True)
@@ -142,10 +144,10 @@ def blender_path(path: Path) -> str:
     return bpy.path.relpath(str(path)) if bpy.data.is_saved else str(path)
 
 
-def _reserve(name, folder):
+def _reserve(name, folder, otherwise):
     """Create an empty file that nobody else uses. Names that exist already are counted up and never reused: an older
     volume, an undone one or another .blend may read them. Names of objects may be longer than those of files."""
-    folder = writable_folder(folder)
+    folder = writable_folder(folder, otherwise)
     stem = bpy.path.clean_name(name).encode()[:_LONGEST].decode(errors="ignore")
     path, number = folder / f"{stem}.vdb", 0
     while True:

@@ -10,6 +10,8 @@ from uuid import uuid4
 
 from ..errors import VADError
 
+ELSEWHERE = "choose another folder"  # what helps, in most places
+
 _kept = local()  # `waiting`, the files that are to take their places together, where some are: (temporary, path)
 
 
@@ -36,12 +38,13 @@ def together() -> Iterator[None]:
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike, otherwise: str = ELSEWHERE) -> Iterator[Path]:
     """Yield a temporary path beside `path` to write to; it takes `path`'s place when the block ends without an error,
     or later, see :func:`together`.
 
     Whatever else happens, Ctrl-C included, `path` stays as it was and the temporary file is removed. An OSError
-    (folder missing or not writable, disk full) becomes a :class:`VADError` of one line.
+    (folder missing or not writable, disk full) becomes a :class:`VADError` of one line, which says what to do
+    `otherwise`.
     """
     path = Path(path)
     if not path.name:
@@ -49,7 +52,7 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     temporary = path.with_name(f".{uuid4().hex}{path.suffix}")
     waiting = getattr(_kept, "waiting", None)
     try:
-        with _errors_of(path):
+        with _errors_of(path, otherwise):
             yield temporary
             with open(temporary, "rb+") as file:
                 os.fsync(file.fileno())
@@ -63,13 +66,13 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextmanager
-def _errors_of(path):
+def _errors_of(path, otherwise=ELSEWHERE):
     """Makes a :class:`VADError` of one line, that names the file, of an OSError."""
     try:
         yield
     except OSError as error:
         raise VADError(
-            f"{path} cannot be written ({error.strerror or error}); free space there or choose another folder"
+            f"{path} cannot be written ({error.strerror or error}); free space there or {otherwise}"
         ) from error
 
 
@@ -78,12 +81,13 @@ def _remove(temporary):
         temporary.unlink(missing_ok=True)
 
 
-def writable_folder(path: str | os.PathLike) -> Path:
-    """Make the folder `path` where it is missing, and prove that files can be made in it. Raises :class:`VADError`."""
+def writable_folder(path: str | os.PathLike, otherwise: str = ELSEWHERE) -> Path:
+    """Make the folder `path` where it is missing, and prove that files can be made in it. Raises :class:`VADError`,
+    which says what to do `otherwise`."""
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):
             return path
     except OSError as error:
-        raise VADError(f"nothing can be written into {path} ({error.strerror}); choose another folder") from error
+        raise VADError(f"nothing can be written into {path} ({error.strerror}); {otherwise}") from error

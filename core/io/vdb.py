@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError, VADError
 from ..field.blocks import each, node_gradient
 from ..field.distance_field import BandedField, DistanceField
-from .atomic import atomic_path
+from .atomic import ELSEWHERE, atomic_path
 from .openvdb_module import fill, load_openvdb
 from .own_files import MADE_BY
 
@@ -16,7 +16,9 @@ _SMALLEST = 1.5e-5  # the cube of a voxel's size counts as zero below 3e-15
 _FOG_CELLS = 2.0  # the visible fog fades out at this distance from the surface
 
 
-def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradient: bool = False) -> None:
+def write_vdb(
+    path: str | os.PathLike, field: DistanceField | BandedField, gradient: bool = False, otherwise: str = ELSEWHERE
+) -> None:
     """Write `field` as the OpenVDB file `path`, 32-bit floats, placed by voxel size and origin in input units.
 
     udf      : the distances. Background: the band's half width, or the largest distance of a dense field, whose
@@ -27,7 +29,7 @@ def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradi
                zero for its last cell
 
     Raises :class:`MissingDependency` without OpenVDB, :class:`InputError` for cells smaller than it takes and for paths
-    that are no text, :class:`VADError` where the file cannot be written whole.
+    that are no text, :class:`VADError` where the file cannot be written whole, which says what to do `otherwise`.
     """
     openvdb = load_openvdb()
     try:
@@ -40,10 +42,10 @@ def write_vdb(path: str | os.PathLike, field: DistanceField | BandedField, gradi
             "in smaller units"
         )
     grids = _grids(openvdb, field, gradient)
-    with atomic_path(path) as temporary:
+    with atomic_path(path, otherwise) as temporary:
         openvdb.write(str(temporary), grids=grids, metadata={"creator": MADE_BY})
         if not _is_whole(temporary, len(grids)):
-            raise VADError(f"{path} cannot be written whole (disk full?); free space there or choose another folder")
+            raise VADError(f"{path} cannot be written whole (disk full?); free space there or {otherwise}")
 
 
 def _grids(openvdb, field, gradient):

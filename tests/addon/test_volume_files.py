@@ -168,6 +168,7 @@ def test_a_volume_that_cannot_be_copied_stays_and_that_is_said(blender, unsaved,
     assert unsaved.grids.load()
     (warning,) = blender.context.scene.vad.result["vad_warnings"].splitlines()
     assert warning.startswith("The volume stays in the cache folder: ")
+    assert warning.endswith("; save the .blend in another folder")
     (tmp_path / "vad").unlink()
     blender.ops.wm.save_mainfile()
     assert unsaved.filepath == "//vad/Scan.vdb"
