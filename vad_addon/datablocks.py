@@ -66,9 +66,14 @@ def replace_data(old: bpy.types.ID, new: bpy.types.ID) -> None:
 
 
 def replace_volume(old: bpy.types.Volume, new: bpy.types.Volume) -> None:
-    """Let `old` read the file of `new`, keep all else as the user left it, and remove `new`."""
+    """Let `old` read the file of `new`, keep all else as the user left it, and remove `new`. A file packed into the
+    .blend goes: unpacked later, it would be written over the one that is read now."""
     grid = old.grids[old.grids.active_index].name if len(old.grids) else ""
     old.filepath = new.filepath
+    if old.packed_file is not None:
+        packs = bpy.data.use_autopack
+        bpy.ops.file.unpack_item(method="USE_ORIGINAL", id_name=old.name, id_type=int.from_bytes(b"VO", "little"))
+        bpy.data.use_autopack = packs  # unpacking ends it
     old.grids.load()
     old.grids.active_index = max(old.grids.find(grid), 0)
     bpy.data.batch_remove([new])

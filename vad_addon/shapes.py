@@ -73,6 +73,8 @@ def _field(collection):
     if field is None:
         raise InputError(f"{collection.name} has no volume: reconstruct again")
     if _distances(field) is None:
+        if field.data.packed_file is not None:
+            raise InputError(f"{field.name} is packed: press File > External Data > Unpack Resources, then try again")
         raise InputError(f"{field.name} cannot be read from {volume_files.file_of(field.data)}: reconstruct again")
     return field
 

@@ -53,6 +53,18 @@ def test_without_the_file_of_the_volume_they_say_so_and_leave_nothing(blender, r
     assert (set(blender.data.objects), len(blender.data.node_groups)) == before
 
 
+@pytest.mark.parametrize("operator", ["shell", "slice"])
+def test_of_a_volume_that_is_packed_alone_they_say_what_to_do(blender, result, tmp_path, operator):
+    blender.ops.file.pack_all()
+    blender.ops.wm.save_mainfile()
+    (tmp_path / "vad" / "Scan.vdb").unlink()
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    with pytest.raises(RuntimeError, match="Scan field is packed: press File > External Data > Unpack Resources"):
+        getattr(blender.ops.vad, operator)()
+    blender.ops.file.unpack_all(method="WRITE_ORIGINAL")
+    assert getattr(blender.ops.vad, operator)() == {"FINISHED"}
+
+
 @pytest.mark.parametrize("how", ["excluded", "unlinked", "linked"])
 @pytest.mark.parametrize("operator", ["shell", "slice", "normals_to_geometry"])
 def test_results_that_take_no_more_objects_say_so(blender, result, linked, operator, how):
