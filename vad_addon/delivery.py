@@ -31,7 +31,7 @@ def deliver(
     The field stays as it is where the outcome is made from its file.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
     for large coordinates. Of new results only the mesh is shown. A volume that cannot be written becomes a warning: the
-    other results are delivered.
+    other results are delivered, and an earlier volume stays for what follows it.
     The collection carries the run's report as JSON in its custom property ``vad_report``; see also :mod:`results`.
     """
     warnings = [*source.warnings, *outcome.warnings]
@@ -40,10 +40,11 @@ def deliver(
     if collection is not None and results.are_edited([*collection.objects, *results.members(collection)]):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
-    roles, known = results.ROLES, results.member(collection, results.FIELD) if collection is not None else None
-    if known is not None and outcome.volume == volume_files.file_of(known.data):
+    known = results.member(collection, results.FIELD) if collection is not None else None
+    stands = known is not None and outcome.volume == volume_files.file_of(known.data)
+    if stands:
         report = json.dumps(json.loads(collection[results.REPORT]) | json.loads(outcome.report))
-        outcome, roles = replace(outcome, volume=None, report=report), [role for role in roles if role != results.FIELD]
+        outcome = replace(outcome, volume=None, report=report)
     with ExitStack() as rollback:
         made = _data(source, outcome, warnings, rollback)
         if collection is None:
@@ -55,7 +56,7 @@ def deliver(
     _recast(collection, made)
     turned = results.note_turn(collection)
     looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
-    for role in roles:
+    for role in (role for role in results.ROLES if role != results.FIELD or role in made):
         _place(collection, role, made.get(role), outcome.origin, turned)
     stays = before if results.mesh(collection) == mesh else set()
     _show_mesh_first(scene, collection, stays)
@@ -64,9 +65,12 @@ def deliver(
     if results.FIELD in made:
         shapes.follow(collection)
         materials.fit_fog(results.member(collection, results.FIELD).data, outcome.cell, outcome.shape)
-    if results.member(collection, results.FIELD) is not None:
+    collection.pop(results.FIELD_OF, None)
+    if stands or results.FIELD in made:
         made_from = overlay.samples_of(made[results.SAMPLES])[:3]
         collection[results.FIELD_OF] = stored_field.identity(*made_from, json.loads(outcome.report)["settings"])
+    elif known is not None:
+        warnings.append(f"{known.name} is out of date: it stays as an earlier run left it")
     collection[results.REPORT] = outcome.report
     collection[results.SUMMARY] = "\n".join(_summary(outcome))
     collection[results.WARNINGS] = "\n".join(warnings)

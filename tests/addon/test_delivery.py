@@ -113,6 +113,53 @@ def test_a_second_run_updates_in_place(blender, run, scan):
     assert len(blender.data.volumes) == len(blender.data.pointclouds) == 1
 
 
+@pytest.mark.parametrize("packs", [False, True])
+def test_a_packed_volume_is_not_unpacked_over_the_one_that_took_its_place(blender, folder, run, scan, packs):
+    made = run()
+    made["field"].data["asset"] = "X42"
+    blender.ops.file.pack_all()
+    blender.data.use_autopack = packs
+    assert run(resolution=32) == made
+    volume, file = made["field"].data, folder / "vad" / "Scan_001.vdb"
+    assert volume.packed_file is None
+    assert (volume["asset"], blender.data.use_autopack) == ("X42", packs)
+    assert volume.grids["udf"].matrix_object[0][0] == pytest.approx(volume["vad_cell"])
+    written = file.read_bytes()
+    blender.ops.wm.save_mainfile()
+    assert (volume.packed_file is not None) == packs
+    blender.data.use_autopack = False
+    if packs:
+        blender.ops.file.unpack_all(method="WRITE_ORIGINAL")
+    assert file.read_bytes() == written
+
+
+def test_where_no_volume_can_be_written_the_earlier_one_stays_for_what_follows_it(
+    blender, folder, run, scan, extension
+):
+    made, warnings = run(), extension("vad_addon.results").warnings
+    field, file = made["field"], made["field"].data.filepath
+    blender.ops.vad.shell()
+    shell = blender.context.active_object
+    blender.ops.vad.slice()
+    cut = blender.context.active_object
+    (folder / "vad").rename(folder / "kept")
+    (folder / "vad").write_text("in the way")
+    make_active(blender, scan)
+    assert run(resolution=32)["field"] == field
+    assert field.data.filepath == file
+    missing, stale = warnings(blender.context.scene.vad.result)
+    assert missing.startswith("No volume: nothing can be written into ")
+    assert missing.endswith("; save the .blend in another folder")
+    assert stale == "Scan field is out of date: it stays as an earlier run left it"
+    (folder / "vad").unlink()
+    (folder / "kept").rename(folder / "vad")
+    assert blender.ops.vad.reextract(resolution=32, surface="double") == {"FINISHED"}  # not from the old one
+    assert warnings(blender.context.scene.vad.result) == []
+    assert field.data.filepath != file
+    assert shell.modifiers[0].object == shell.parent == cut.parent == field
+    assert len(evaluated(blender, shell)[1].polygons) > 100
+
+
 def test_materials_modifiers_and_places_survive(blender, run, scan):
     made = run()
     for obj in made.values():
