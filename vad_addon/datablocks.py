@@ -85,7 +85,7 @@ def _float32(values):
 
 def _empty_cloud(count):
     """A point cloud of `count` points anywhere."""
-    if hasattr(bpy.types.PointCloud, "resize"):
+    if "resize" in bpy.types.PointCloud.bl_rna.functions:
         cloud = bpy.data.pointclouds.new("points")
         cloud.resize(count)
         return cloud
@@ -93,7 +93,8 @@ def _empty_cloud(count):
 
 
 def _cloud_by_nodes(count):
-    """Before Blender 5.1 Python cannot size a point cloud, but geometry nodes can turn loose vertices into one."""
+    """Before Blender 5.1 Python cannot size a point cloud, but geometry nodes can turn loose vertices into one. In a
+    scene of its own: any other may be linked."""
     with ExitStack() as temporary:
 
         def keep(block):
@@ -110,8 +111,12 @@ def _cloud_by_nodes(count):
         nodes.links.new(convert.outputs[0], end.inputs[0])
         mesh = keep(bpy.data.meshes.new("points"))
         mesh.vertices.add(count)
+        mesh.attributes.remove(mesh.attributes[".select_vert"])
         carrier = keep(bpy.data.objects.new("points", mesh))
         carrier.modifiers.new("points", "NODES").node_group = nodes
-        bpy.context.scene.collection.objects.link(carrier)
-        geometry = carrier.evaluated_get(bpy.context.evaluated_depsgraph_get()).evaluated_geometry()
+        scene = keep(bpy.data.scenes.new("points"))
+        scene.collection.objects.link(carrier)
+        layer = scene.view_layers[0]
+        layer.update()
+        geometry = carrier.evaluated_get(layer.depsgraph).evaluated_geometry()  # owns the points
         return geometry.pointcloud.copy()

@@ -26,6 +26,12 @@ class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
     directory: bpy.props.StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: bpy.props.CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
+    @classmethod
+    def poll(cls, context):
+        problem = results.scene_problem(context.scene)
+        cls.poll_message_set(problem)
+        return not problem
+
     def invoke(self, context, event):
         if self.files:  # dropped
             return self.execute(context)

@@ -35,7 +35,7 @@ class VAD_PT_reconstruct(_Sidebar, bpy.types.Panel):
             _draw_progress(layout, running)
             return
         objects = sources(context)
-        if problem := selection_problem(context):
+        if problem := results.scene_problem(context.scene) or selection_problem(context):
             draw_message(layout, problem, "INFO")
         else:
             name = objects[0].name if len(objects) == 1 else f"{len(objects)} objects"

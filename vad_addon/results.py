@@ -135,6 +135,11 @@ def is_editable(block: bpy.types.ID) -> bool:
     return block.library is None and block.override_library is None
 
 
+def scene_problem(scene: bpy.types.Scene) -> str:
+    """Why nothing can be put into `scene`, one line; empty where something can."""
+    return "" if is_editable(scene) else f"{scene.name} is a scene of another file: make it local, or use another scene"
+
+
 def home(collections, scene: bpy.types.Scene) -> bpy.types.Collection:
     """The first of some collections that takes new objects, else the scene's own."""
     return next(filter(is_editable, collections), scene.collection)

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import VADError
-from . import job, outcome, points_in, status
+from . import job, outcome, points_in, results, status
 
 _TICK = 0.1  # seconds between looks at the worker
 
@@ -28,7 +28,8 @@ class Run:
 
     @classmethod
     def poll(cls, context):
-        problem = "A run is under way: wait for it, or cancel it" if job.running() else cls.problem(context)
+        under_way = "A run is under way: wait for it, or cancel it" if job.running() else ""
+        problem = under_way or results.scene_problem(context.scene) or cls.problem(context)
         cls.poll_message_set(problem)
         return not problem
 
@@ -78,6 +79,8 @@ class Run:
             return {"PASS_THROUGH"}
         try:
             scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self._scene), context.scene)
+            if problem := results.scene_problem(scene):
+                raise VADError(problem)
             self.deliver(context, scene, running.outcome())
         except VADError as error:
             return self._fail(error)

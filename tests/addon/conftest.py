@@ -85,6 +85,19 @@ def linked(blender):
 
 
 @pytest.fixture
+def linked_scene(blender, add_mesh, sphere, tmp_path):
+    """The scene that is open: linked from another file, with the active object "Scan" in it, a sphere."""
+    add_mesh("Scan", sphere)
+    blender.data.libraries.write(str(tmp_path / "other.blend"), {blender.context.scene})
+    blender.ops.wm.read_homefile(use_empty=True)
+    with blender.data.libraries.load(str(tmp_path / "other.blend"), link=True) as (there, wanted):
+        wanted.scenes = list(there.scenes)
+    (scene,) = wanted.scenes
+    blender.context.window.scene = scene
+    return scene
+
+
+@pytest.fixture
 def sphere():
     """(500,3) points of the unit sphere, on a Fibonacci spiral."""
     z = 1 - (2 * np.arange(500) + 1) / 500

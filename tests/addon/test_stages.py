@@ -137,6 +137,30 @@ def test_beside_a_scan_in_a_linked_collection_they_go_into_the_scene(blender, ad
     assert {"Scan cleaned", "Scan cleaned normals"} <= set(blender.context.scene.collection.objects.keys())
 
 
+@pytest.mark.parametrize("operator", ["reconstruct", "denoise", "normals", "reextract", "import_points"])
+def test_into_a_linked_scene_nothing_is_put(blender, linked_scene, extension, operator):
+    assert blender.context.active_object.name == "Scan"
+    before = set(blender.data.objects)
+    with pytest.raises(RuntimeError, match="Scene is a scene of another file: make it local, or use another scene"):
+        getattr(blender.ops.vad, operator)()
+    assert set(blender.data.objects) == before
+
+
+def test_points_are_made_whatever_scene_is_open(blender, linked_scene, extension, sphere):
+    scenes, made = set(blender.data.scenes), extension("vad_addon.datablocks")
+    cloud = made.pointcloud_data("cloud", sphere, np.zeros(3), {})
+    assert_allclose(values(cloud, "position", "vector", 3), sphere, atol=1e-6)
+    assert {attribute.name for attribute in cloud.attributes} <= {"position", "radius"}
+    assert set(blender.data.scenes) == scenes
+
+
+def test_points_are_sized_at_once_where_blender_can(blender, extension, monkeypatch):
+    made = extension("vad_addon.datablocks")
+    can = "resize" in dir(blender.data.pointclouds.new("cloud"))  # which its class does not tell
+    monkeypatch.setattr(made, "_cloud_by_nodes", lambda count: None)
+    assert (made._empty_cloud(3) is not None) == can
+
+
 def test_of_the_scans_collections_they_go_into_one_that_is_shown(blender, scan):
     scene = blender.context.scene
     for name in ("Hidden", "Shown"):
