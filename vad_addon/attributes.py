@@ -15,7 +15,18 @@ _LAYOUT = {  # attribute type -> name of the value, width, NumPy type
     "FLOAT2": ("vector", 2, np.float32),
     "FLOAT_COLOR": ("color", 4, np.float32),
     "BYTE_COLOR": ("color", 4, np.float32),
+    "INT8": ("value", 1, np.int32),
+    "INT16_2D": ("value", 2, np.int32),
+    "INT32_2D": ("value", 2, np.int32),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
 }
+_COLOURS = {"FLOAT_COLOR", "BYTE_COLOR"}
+_BLENDERS = {  # names by which it shades, creases, bevels and draws a mesh: there numbers of a scan do harm, or fail
+    *("custom_normal", "material_index", "sharp_face", "sharp_edge", "crease_vert", "crease_edge"),
+    *("bevel_weight_vert", "bevel_weight_edge", "uv_seam", "freestyle_edge", "freestyle_face"),
+}
+_OTHERS = "scan_"
 
 _LONGEST = 62  # bytes of a name; there may be 67, with what may be put before it
 
@@ -35,30 +46,73 @@ class Attribute:
     def __getitem__(self, rows) -> "Attribute":
         return Attribute(self.kind, self.values[rows])
 
+    @property
+    def is_colour(self) -> bool:
+        return self.kind in _COLOURS
+
 
 def read(data) -> dict[str, Attribute]:
-    """Every attribute that each point of `data` carries, by name, its position and Blender's internal ones left out."""
-    return {
+    """Every attribute that each point of `data` carries, by name, its position, the size that it is drawn at and
+    Blender's internal ones left out. Colours of a mesh's corners are averaged at its points."""
+    found = {
         attribute.name: Attribute(attribute.data_type, values(attribute))
-        for attribute in data.attributes
-        if attribute.domain == "POINT"
-        and attribute.data_type in _LAYOUT
-        and attribute.name != "position"
-        and not attribute.name.startswith(".")
+        for attribute in _own(data)
+        if attribute.domain == "POINT" and attribute.data_type in _LAYOUT
     }
+    for attribute in filter(_is_of_corners, _own(data)):
+        found[attribute.name] = Attribute(attribute.data_type, _at_points(data, values(attribute)))
+    return found
+
+
+def left_out(data) -> list[str]:
+    """Names of what :func:`read` leaves out, be it for its kind or as it is of faces or edges of a mesh."""
+    return [
+        attribute.name
+        for attribute in _own(data)
+        if not _is_of_corners(attribute)
+        and (attribute.data_type not in _LAYOUT or attribute.domain in {"FACE", "EDGE", "CORNER"})
+        and not (attribute.domain != "POINT" and attribute.name in _BLENDERS)
+    ]
+
+
+def _own(data):
+    drawn = {"position"} if isinstance(data, bpy.types.Mesh) else {"position", "radius"}
+    return [one for one in data.attributes if one.name not in drawn and not one.name.startswith(".")]
+
+
+def _is_of_corners(attribute):
+    return attribute.domain == "CORNER" and attribute.data_type in _COLOURS
+
+
+def _at_points(mesh, of_corners):
+    """Means at the points, (n,width) float32, of values (c,width) of the corners of faces; zeros at loose points."""
+    points, count = np.empty(len(mesh.loops), np.int32), len(mesh.vertices)
+    mesh.loops.foreach_get("vertex_index", points)
+    sums = np.stack([np.bincount(points, column, count) for column in of_corners.T], axis=1)
+    return (sums / np.maximum(np.bincount(points, minlength=count), 1)[:, None]).astype(np.float32)
+
+
+def renamed(attributes: dict[str, Attribute], taken=()) -> dict[str, Attribute]:
+    """The same under names that are free: those that are `taken`, or that Blender goes by, get `scan_` put before."""
+    free = {}
+    for name, attribute in attributes.items():
+        while name in free or name in taken or name in _BLENDERS:
+            name = _OTHERS + name
+        free[name] = attribute
+    return free
 
 
 def write(data, attributes: dict[str, Attribute]) -> None:
-    """Set these attributes on the points of `data`, replacing those of the same name. Those that points cannot have in
-    Blender, as `material_index`, get `scan_` before their name, and long names are cut off."""
-    for name, attribute in attributes.items():
+    """Set these attributes on the points of `data`, replacing those of the same name. Those that Blender goes by, or
+    that points cannot have there, get `scan_` before their name, and long names are cut off."""
+    for name, attribute in renamed(attributes).items():
         name = name.encode()[:_LONGEST].decode(errors="ignore")
         if name in data.attributes and data.attributes[name].data_type != attribute.kind:
             data.attributes.remove(data.attributes[name])
         target = (
             data.attributes.get(name)
             or data.attributes.new(name, attribute.kind, "POINT")
-            or data.attributes.new(f"scan_{name}", attribute.kind, "POINT")
+            or data.attributes.new(_OTHERS + name, attribute.kind, "POINT")
         )
         target.data.foreach_set(_LAYOUT[attribute.kind][0], np.ascontiguousarray(attribute.values).ravel())
 

@@ -13,7 +13,7 @@ from .attributes import Attribute
 from .outcome import Outcome
 from .points_in import Source, objects_of
 
-_OWN = {"normal", "confidence", "distance", "moved", "radius"}  # attributes that results set themselves
+OWN = {"normal", "confidence", "distance", "radius"}  # attributes that results set themselves
 
 
 def deliver(
@@ -80,11 +80,14 @@ def deliver(
 
 def of_samples(source: Source, outcome: Outcome) -> tuple[dict[str, Attribute], dict[str, Attribute]]:
     """What the samples carry: of their points, and what a run found of them."""
-    carried = {
-        name: attribute[outcome.source_index] for name, attribute in source.attributes.items() if name not in _OWN
-    }
+    carried = {name: attribute[outcome.source_index] for name, attribute in _carried(source).items()}
     found = dict(normal=Attribute.of(outcome.normals), confidence=Attribute.of(outcome.confidence))
     return carried, found | dict(radius=radius(outcome))
+
+
+def _carried(source):
+    """What the points carry, under names that results do not set themselves."""
+    return attributes.renamed(source.attributes, OWN)
 
 
 def radius(outcome: Outcome) -> Attribute:
@@ -199,7 +202,7 @@ def _stay_active(layers, mesh):
 
 def _colour(objects, source):
     """Give new meshes and samples a material that shows the colours their points carry, if they do."""
-    names = [name for name, attribute in source.attributes.items() if attribute.kind in {"FLOAT_COLOR", "BYTE_COLOR"}]
+    names = [name for name, attribute in _carried(source).items() if attribute.is_colour]
     painted = [obj for obj in objects if results.role(obj) in {*results.MESHES, results.SAMPLES}]
     if names and painted:
         material = materials.carried_colours(f"{source.name} colours", names[0])

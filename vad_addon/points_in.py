@@ -80,7 +80,7 @@ def missing(context: bpy.types.Context) -> str:
 def selected(context: bpy.types.Context, selected_only: bool = False) -> Source:
     """The points of :func:`sources`, by :func:`gather`."""
     found, lost = gather(sources(context), context, selected_only), missing(context)
-    return replace(found, warnings=(lost,)) if lost else found
+    return replace(found, warnings=(*found.warnings, lost)) if lost else found
 
 
 def selection_problem(context: bpy.types.Context) -> str:
@@ -90,6 +90,8 @@ def selection_problem(context: bpy.types.Context) -> str:
     obj = next(iter(_chosen(context)), None)
     if obj is None:
         return "No active object: select a point cloud or a mesh"
+    if obj.instance_type == "COLLECTION":
+        return f"{obj.name} shows a collection: press Object > Apply > Make Instances Real and select what that makes"
     if results.role(obj) is not None:
         again = "" if results.run_of(obj) is None else "press Extract Again for other meshes, or "
         return f"The scan of {obj.name} is gone, or unknown: {again}select another scan"
@@ -137,7 +139,39 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
     axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
     fixed = np.flatnonzero(axes.any(axis=1))
     uids, constraints = tuple(obj.session_uid for obj in objects), (fixed, axes[fixed]) if len(fixed) else None
-    return Source(objects[0].name, uids, points, joined, constraints)
+    return Source(objects[0].name, uids, points, joined, constraints, tuple(_left_out(objects, joined, context)))
+
+
+def _left_out(objects, carried, context):
+    """What is there and not among the points, or what they carry, a line on each kind."""
+    for obj in objects:
+        if count := _instances_with_points(_geometry(obj, context)):
+            yield (
+                f"{obj.name}: {count:,} instances count as a point each; for the points within them add Realize "
+                "Instances at the end of its geometry nodes"
+            )
+    names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
+    names += [group.name for obj in objects for group in obj.vertex_groups]
+    if lost := sorted(set(names) - set(carried)):
+        yield f"Not carried over: {', '.join(lost)}; only numbers and colours of points are, no vertex groups"
+
+
+def _instances_with_points(geometry):
+    """Number of instances, where any of them holds several points."""
+    cloud = geometry.instances_pointcloud()
+    if not _has_points(cloud) or not any(map(_holds_points, geometry.instance_references())):
+        return 0
+    return cloud.attributes.domain_size("POINT")
+
+
+def _holds_points(reference):
+    if isinstance(reference, bpy.types.Object):
+        return reference.type in READABLE or reference.instance_type == "COLLECTION"
+    if isinstance(reference, bpy.types.Collection):
+        return any(map(_holds_points, reference.all_objects))
+    parts = filter(_has_points, (reference.mesh, reference.pointcloud, reference.curves))
+    own = sum(part.attributes.domain_size("POINT") for part in parts)
+    return own > 1 or any(map(_holds_points, reference.instance_references()))
 
 
 def point_count(objects: list[bpy.types.Object], context: bpy.types.Context) -> int:

@@ -9,11 +9,13 @@ import numpy as np
 from ..core.settings import options
 from . import attributes, datablocks, extras, overlay, points_in, results, run, stored_field, volume_files
 from .attributes import Attribute
-from .delivery import deliver, moved_within, of_samples, radius
+from .delivery import OWN, deliver, moved_within, of_samples, radius
 from .operators import report_run
 from .outcome import CLEANING, NORMALS, Task
 from .points_in import AXIS, Source
 from .properties import setting_property, settings_from, taken_over
+
+_OWN = {"moved", "radius"}  # attributes that cleaned points set themselves
 
 
 class VAD_OT_denoise(run.Run, bpy.types.Operator):
@@ -51,7 +53,7 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
     def deliver(self, context, scene, found):
         source, rows = self._source, found.source_index
         moved = np.linalg.norm(found.points - source.points[rows], axis=1)
-        carried = {name: attribute[rows] for name, attribute in source.attributes.items()}
+        carried = {name: attribute[rows] for name, attribute in attributes.renamed(source.attributes, _OWN).items()}
         carried |= dict(moved=Attribute.of(moved), radius=radius(found))
         if source.constraints:
             axes = np.zeros_like(source.points)
@@ -147,7 +149,8 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         made_from = [source for source in results.sources(collection) if source is not None]
         name = made_from[0].name if made_from else samples.name.removesuffix(" samples")
         uids = tuple(source.session_uid for source in made_from)
-        self._source = Source(name, uids, points, attributes.read(samples.data), None)
+        carried = {name: found for name, found in attributes.read(samples.data).items() if name not in OWN}
+        self._source = Source(name, uids, points, carried, None)
         self._collection = collection.session_uid if results.can_be_updated(collection) else None
         field, volume = results.member(collection, results.FIELD), None
         same = collection.get(results.FIELD_OF) == stored_field.identity(near, axes, confidence, asdict(settings))

@@ -55,6 +55,46 @@ def test_samples_and_surface_carry_what_the_source_carried(run, scan, sphere):
     assert_allclose(values(surface, "Col", "color", 4)[:, :3], 0.5 + 0.5 * sphere[label], atol=1e-6)
 
 
+def test_names_that_results_or_blender_go_by_get_another(blender, run, scan, sphere):
+    ours = {"normal": "FLOAT_VECTOR", "confidence": "FLOAT", "distance": "FLOAT", "scan_distance": "INT8"}
+    for name, kind in (ours | {"custom_normal": "FLOAT_VECTOR", "crease_vert": "FLOAT"}).items():
+        attribute = scan.data.attributes.new(name, kind, "POINT")
+        if kind == "FLOAT_VECTOR":
+            attribute.data.foreach_set("vector", np.tile(np.float32([0, 0, 7]), 500))
+        else:
+            attribute.data.foreach_set("value", np.full(500, 7, np.float32 if kind == "FLOAT" else np.int32))
+    made = run()
+    for again in (False, True):
+        for role in ("samples", "surface"):
+            data = made[role].data
+            assert_allclose(values(data, "scan_normal", "vector", 3)[:, 2], 7)
+            assert_allclose(values(data, "scan_custom_normal", "vector", 3)[:, 2], 7)
+            for name in ("confidence", "distance", "scan_distance", "crease_vert"):
+                assert set(values(data, f"scan_{name}")) == {7.0}
+            assert {"custom_normal", "crease_vert", "scan_radius"}.isdisjoint(data.attributes.keys())
+            assert values(data, "confidence").max() <= 1
+        normals = np.array([corner.vector for corner in made["surface"].data.corner_normals])
+        assert np.abs(normals.mean(axis=0)).max() < 0.1
+        if not again:
+            blender.ops.vad.reextract(resolution=20)
+
+
+def test_colours_of_corners_reach_the_surface_and_what_does_not_is_told(blender, folder, run, add, extension):
+    blender.ops.mesh.primitive_uv_sphere_add(segments=32, ring_count=16)
+    ball = blender.context.active_object
+    painted = ball.data.attributes.new("Painted", "BYTE_COLOR", "CORNER")
+    colours = np.array([(*ball.data.vertices[loop.vertex_index].co, 1) for loop in ball.data.loops]) / 2 + 0.5
+    painted.data.foreach_set("color", colours.astype(np.float32).ravel())
+    ball.data.attributes.new("note", "STRING", "POINT")
+    ball.data.attributes.new("part", "INT", "FACE")
+    ball.vertex_groups.new(name="Weights")
+    surface = run()["surface"]
+    shown = values(surface.data, "Painted", "color", 4)[:, :3]
+    assert np.abs(shown - (0.5 + 0.5 * (positions(surface.data) + np.array(surface.location)))).max() < 0.15
+    (told,) = extension("vad_addon.results").warnings(blender.context.scene.vad.result)
+    assert told.startswith("Not carried over: UVMap, Weights, note, part; only numbers and colours of points")
+
+
 def test_colours_and_intensity_of_a_scanners_file_reach_the_surface(blender, folder, sphere):
     colours = np.rint(255 * (0.5 + 0.5 * sphere)).astype(int)
     np.savetxt(folder / "scan.pts", np.column_stack([sphere, sphere[:, 2], colours]), header="500", comments="")

@@ -86,13 +86,13 @@ def test_columns_named_as_blenders_own_leave_those_alone(blender, tmp_path):
 
 
 def test_columns_that_points_cannot_have_in_blender_get_another_name(blender, tmp_path):
-    names = "material_index", "sharp_face", 40 * "long", "é" * 50
-    rows = ["x,y,z," + ",".join(names)] + [f"{k},{k * k},1,5,6,7,8" for k in range(9)]
+    names = "material_index", "sharp_face", 40 * "long", "é" * 50, "crease_vert"
+    rows = ["x,y,z," + ",".join(names)] + [f"{k},{k * k},1,5,6,7,8,9" for k in range(9)]
     (tmp_path / "scan.csv").write_text("\n".join(rows), encoding="utf-8")
     blender.ops.vad.import_points(filepath=str(tmp_path / "scan.csv"))
     obj = blender.context.active_object
     found = {each.name for each in obj.data.attributes if each.name != "position" and not each.name.startswith(".")}
-    assert {"scan_material_index", "scan_sharp_face", (40 * "long")[:62]} <= found
+    assert {"scan_material_index", "scan_sharp_face", "scan_crease_vert", (40 * "long")[:62]} <= found
     assert all(len(obj.data.attributes[name].data) == 9 for name in found)
     assert [value.value for value in obj.data.attributes["scan_material_index"].data] == [5] * 9
     assert blender.ops.vad.reconstruct(resolution=16) == {"FINISHED"}

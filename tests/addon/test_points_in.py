@@ -138,6 +138,38 @@ def test_few_instances_are_told_from_few_points(blender, read, add_mesh, extensi
         read(scan)
 
 
+def test_instances_of_scans_are_told_from_points(blender, add_mesh, sphere, extension):
+    points_in = extension("vad_addon.points_in")
+
+    def told(obj):
+        return points_in.gather([obj], blender.context).warnings
+
+    assert told(add_mesh("Plain", sphere)) == ()
+    many = made_by_nodes(blender, add_mesh("Many", sphere), instances=True)
+    (warning,) = told(many)
+    assert warning.startswith("Many: 500 instances count as a point each; for the points within them add Realize")
+    nodes = many.modifiers["nodes"].node_group
+    (at,) = (node for node in nodes.nodes if node.bl_idname == "GeometryNodeInstanceOnPoints")
+    single = nodes.nodes.new("GeometryNodeMeshLine")
+    single.inputs["Count"].default_value = 1
+    nodes.links.new(single.outputs[0], at.inputs["Instance"])
+    assert told(many) == ()
+    scan = nodes.nodes.new("GeometryNodeObjectInfo")
+    scan.inputs["Object"].default_value, scan.inputs["As Instance"].default_value = blender.data.objects["Plain"], True
+    nodes.links.new(scan.outputs["Geometry"], at.inputs["Instance"])
+    assert len(told(many)) == 1
+
+
+def test_of_an_empty_that_shows_a_collection_it_is_said_what_helps(blender, add, add_mesh, sphere):
+    scans = blender.data.collections.new("Scans")
+    scans.objects.link(add_mesh("Scan", sphere))
+    shows = add("Shows", None)
+    blender.data.objects["Scan"].select_set(False)
+    shows.instance_type, shows.instance_collection = "COLLECTION", scans
+    with pytest.raises(RuntimeError, match="Shows shows a collection: press Object > Apply > Make Instances Real and"):
+        blender.ops.vad.reconstruct(resolution=16)
+
+
 def test_an_object_without_points_is_refused(read, add_mesh, extension):
     with pytest.raises(extension("core.errors").InputError, match="Scan has 0 points"):
         read(add_mesh("Scan", np.empty((0, 3))))
