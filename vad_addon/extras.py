@@ -162,8 +162,10 @@ class VAD_OT_show(bpy.types.Operator):
         for obj in objects:
             results.show(context.scene, obj, shown)
         for obj in objects:
-            if shown and not obj.visible_get():
-                self.report({"WARNING"}, f"{obj.name} is off, or its collection is hidden: show it in the outliner")
+            if problem := results.unseen(obj):
+                self.report({"WARNING"}, problem)
+            if obj.library is not None:
+                self.report({"WARNING"}, f"{obj.name} is linked: whether renders show it is set in its own file")
         return {"FINISHED"}
 
 

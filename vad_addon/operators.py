@@ -31,12 +31,15 @@ class VAD_OT_reconstruct(run.Run, bpy.types.Operator):
         mesh = results.mesh(collection)
         if mesh is not None and collection not in known and not bpy.app.background:
             results.take_the_stage(context, mesh, self._source.uids)
-        report_run(self, collection)
+        report_run(self, context, collection)
 
 
-def report_run(operator: bpy.types.Operator, collection: bpy.types.Collection) -> None:
+def report_run(operator: bpy.types.Operator, context: bpy.types.Context, collection: bpy.types.Collection) -> None:
     """Say in the status bar and the info editor what a run found and what went less than well."""
-    for warning in results.warnings(collection):
+    told, mesh = results.warnings(collection), results.mesh(collection)
+    if mesh is not None and context.scene.vad.result == collection:
+        told.append(results.unseen(mesh))
+    for warning in filter(None, told):
         operator.report({"WARNING"}, warning)
     operator.report({"INFO"}, f"{collection.name}: {', '.join(results.summary(collection))}")
 

@@ -199,12 +199,21 @@ def is_in(collection: bpy.types.Collection, layer: bpy.types.ViewLayer) -> bool:
 
 
 def show(scene: bpy.types.Scene, obj: bpy.types.Object, shown: bool) -> None:
-    """Show `obj` in every view layer of `scene` and in renders, or hide it there."""
-    obj.hide_render = not shown
+    """Show `obj` in every view layer of `scene` and in renders, or hide it there; what is linked in the former alone,
+    as its file says whether it renders."""
+    if obj.library is None:
+        obj.hide_render = not shown
     for layer in scene.view_layers:
         layer.update()
         if obj.name in layer.objects:
             obj.hide_set(not shown, view_layer=layer)
+
+
+def unseen(obj: bpy.types.Object) -> str:
+    """What to say of an object that is not seen though it is shown; empty where its own eye hides it, or it is seen."""
+    if obj.visible_get() or obj.hide_get():
+        return ""
+    return f"{obj.name} is off, or its collection is hidden: show it in the outliner"
 
 
 def leave_modes(context: bpy.types.Context) -> None:

@@ -162,7 +162,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
     def deliver(self, context, scene, found):
         of_scene = scene.collection.children_recursive
         collection = next((one for one in of_scene if one.session_uid == self._collection), None)
-        report_run(self, deliver(scene, self._source, found, collection=collection))
+        report_run(self, context, deliver(scene, self._source, found, collection=collection))
 
 
 def _placed(context, scene, source, data, origin):

@@ -474,6 +474,41 @@ def test_what_cannot_be_shown_is_said(blender, run, scan, capfd, how):
     assert not capfd.readouterr().out
 
 
+@pytest.mark.parametrize("how", ["eye", "excluded", "off", "its own eye"])
+def test_a_run_says_where_its_mesh_is_not_seen(blender, run, scan, capfd, how):
+    surface, home = run()["surface"], blender.context.scene.vad.result
+    layer = blender.context.view_layer.layer_collection.children[home.name]
+    if how == "eye":
+        layer.hide_viewport = True
+    elif how == "excluded":
+        layer.exclude = True
+    elif how == "off":
+        surface.hide_viewport = True
+    else:
+        surface.hide_set(True)
+    make_active(blender, scan)
+    for again in (run, blender.ops.vad.reextract):
+        capfd.readouterr()
+        again(resolution=20)
+        told = "Warning: Scan surface is off, or its collection is hidden: show it in" in capfd.readouterr().out
+        assert told == (how != "its own eye")
+
+
+def test_whether_renders_show_a_linked_scan_is_left_to_its_file(blender, scan, folder, capfd):
+    blender.data.libraries.write(str(folder / "scan.blend"), {scan})
+    blender.ops.wm.read_homefile(use_empty=True)
+    with blender.data.libraries.load(str(folder / "scan.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Scan"]
+    (scan,) = wanted.objects
+    blender.context.scene.collection.objects.link(scan)
+    blender.context.view_layer.objects.active = scan
+    blender.ops.vad.reconstruct(resolution=24)
+    for hidden in (True, False):
+        blender.ops.vad.show(role="source")
+        assert (scan.hide_get(), scan.hide_render) == (hidden, False)
+        assert "Warning: Scan is linked: whether renders show it is set in its own file" in capfd.readouterr().out
+
+
 def test_the_mesh_takes_the_stage_from_all_that_it_was_made_of(blender, run, scan, add_mesh, sphere, extension):
     results = extension("vad_addon.results")
     blender.ops.vad.normals()
