@@ -19,8 +19,9 @@ BESIDE_OFFSET = 2  # cells that a band reaches beyond the offset, at least
 
 def _option(default, help, *, limits=None, choices=None, word=None, unit=""):
     """A field; `word` is the one text that stands for a value found from the data, or for the default None, where
-    `limits` ask for a number."""
-    metadata = dict(help=help, limits=limits, choices=choices, word=word, unit=unit)
+    `limits` ask for a number; `choices` are what it may be, and what each of these means."""
+    names = choices and tuple(choices)
+    metadata = dict(help=help, limits=limits, choices=names, meanings=choices, word=word, unit=unit)
     return dataclasses.field(default=default, metadata=metadata)
 
 
@@ -68,13 +69,22 @@ class Settings:
         "Mesh to extract: the double cover, closed and two-sided; the single layer, one sheet that is open where the "
         "surface is open; both; the signed surface of a closed shape, with the field negative inside; or none (field "
         "and normals only)",
-        choices=("double", "single", "both", "signed", "none"),
+        choices={
+            "double": "The double cover: closed, a layer on either side of every sheet",
+            "single": "The single layer: one sheet, open where the surface is open",
+            "both": "The double cover and the single layer",
+            "signed": "The surface of a closed shape; distances in the field are negative inside",
+            "none": "Field and normals only",
+        },
     )
     faces: str = _option(
         "triangles",
         "What meshes are made of: triangles, or quads along the grid's axes, for subdivision and sculpting; a few "
         "triangles are kept where a surface ends and where sheets of a single layer meet",
-        choices=("triangles", "quads"),
+        choices={
+            "triangles": "Triangles alone",
+            "quads": "Quads along the grid's axes, for subdivision and sculpting, and few triangles",
+        },
     )
     pieces: float = _option(
         0.0,
@@ -86,31 +96,49 @@ class Settings:
         "reflection",
         "How normals are found: by reflections across the Voronoi bisectors, by minimising the published energy on "
         "samples of the bisectors (slower, the reference), or by a plain local plane fit (PCA, the baseline)",
-        choices=("reflection", "energy", "pca"),
+        choices={
+            "reflection": "By reflections across the Voronoi bisectors",
+            "energy": "By minimising the published energy on samples of the bisectors: slower, the reference",
+            "pca": "By a plain local plane fit: the baseline",
+        },
     )
     integration: str = _option(
         "transport",
         "How the distance gets from the surface to the rest of the box: carried outwards from the surface's points, or "
         "by the published Poisson equation (less exact, the reference)",
-        choices=("transport", "poisson"),
+        choices={
+            "transport": "Carried outwards from the surface's points",
+            "poisson": "By the published Poisson equation: less exact, the reference",
+        },
     )
     diffusion: str = _option(
         "kernel",
         "Where the Poisson equation takes its directions from: the diffusion's closed-form kernels, or the published "
         "diffusion on the grid (the reference; without rims, and refused where points are many, mostly above 2,000)",
-        choices=("kernel", "grid"),
+        choices={
+            "kernel": "From the diffusion's closed-form kernels",
+            "grid": "From the published diffusion on the grid: the reference, for few points",
+        },
     )
     backend: str = _option(
         "auto",
         "What differentiates the energy where the solver is energy: torch, NumPy, or torch where it is installed. "
         "Nothing else in a run uses torch",
-        choices=("numpy", "torch", "auto"),
+        choices={
+            "numpy": "NumPy, which is always there",
+            "torch": "Torch, which has to be installed",
+            "auto": "Torch where it is installed, else NumPy",
+        },
     )
     device: str = _option(
         "auto",
         "Where torch differentiates the energy: on the processor, on an Nvidia GPU (cuda), or on the GPU where torch "
         "sees one. Nothing else in a run uses a GPU",
-        choices=("cpu", "cuda", "auto"),
+        choices={
+            "cpu": "On the processor",
+            "cuda": "On an Nvidia GPU",
+            "auto": "On the GPU where torch sees one, else on the processor",
+        },
     )
     outliers: bool = _option(
         True,
@@ -151,7 +179,7 @@ class Settings:
         if self.band is not None and self.integration == "poisson":
             raise SettingsError(
                 f"band is {self.band:g} and integration 'poisson', which solves in the whole box; leave band at none, "
-                "or use integration='transport'"
+                "or set integration to transport"
             )
         if self.band is not None and self.band < self.offset + BESIDE_OFFSET:
             raise SettingsError(
@@ -167,7 +195,7 @@ class Settings:
         if self.diffusion == "grid" and self.integration != "poisson":
             raise SettingsError(
                 f"diffusion is 'grid' and integration {self.integration!r}, which needs no directions away from the "
-                "surface; use integration='poisson' with it, or diffusion='kernel'"
+                "surface; set integration to poisson, or diffusion to kernel"
             )
 
     @property
@@ -178,7 +206,8 @@ class Settings:
 
 
 def options() -> dict[str, dataclasses.Field]:
-    """Name -> field of each setting: its `.default`, `.type` and `.metadata` (help, limits, choices, word, unit)."""
+    """Name -> field of each setting: its `.default`, `.type` and `.metadata` (help, limits, choices, meanings,
+    word, unit)."""
     return {option.name: option for option in dataclasses.fields(Settings)}
 
 

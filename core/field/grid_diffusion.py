@@ -26,15 +26,15 @@ def check_held(spacing: np.ndarray, grid: Grid, farthest: float) -> None:
     length = _diffusion_length(spacing)
     if farthest > FARTHEST * length:
         raise SettingsError(
-            f"the box reaches {farthest / length:.0f} sqrt(t) from the points, and diffusion='grid' keeps directions "
-            f"up to {FARTHEST:g}; use diffusion='kernel' or fewer points"
+            f"the box reaches {farthest / length:.0f} sqrt(t) from the points, and diffusion 'grid' keeps directions "
+            f"up to {FARTHEST:g}; set diffusion to kernel, or give fewer points"
         )
     cells = length / grid.spacing
     if cells < LEAST_LENGTH:
         needed = int(np.ceil((max(grid.shape) - 1) * LEAST_LENGTH / cells))
         raise SettingsError(
-            f"sqrt(t) is {cells:.2f} cells of the grid, and diffusion='grid' needs {LEAST_LENGTH:g}; "
-            f"use resolution {needed} or more, or diffusion='kernel'"
+            f"sqrt(t) is {cells:.2f} cells of the grid, and diffusion 'grid' needs {LEAST_LENGTH:g}; "
+            f"use resolution {needed} or more, or set diffusion to kernel"
         )
 
 

@@ -93,7 +93,7 @@ def test_no_band_is_none_by_either_name(word):
     ("unfit", "remedy"),
     [
         ({"resolution": 513}, "set band"),
-        ({"band": 4, "integration": "poisson"}, "integration='transport'"),
+        ({"band": 4, "integration": "poisson"}, "set integration to transport"),
         ({"band": 4, "offset": 2.5}, "band of 4.5 or more"),
         ({"resolution": 16, "offset": 2}, r"offset of 1\.6 or less, or a resolution of 20 or more"),
     ],

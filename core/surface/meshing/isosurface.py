@@ -20,7 +20,7 @@ def isosurface(values: np.ndarray | Blocks, level: float) -> tuple[np.ndarray, n
     except MissingDependency as error:
         if isinstance(values, Blocks):
             raise MissingDependency(
-                f"a surface from a band needs OpenVDB: {error}; or leave band out, or ask for surface='none'"
+                f"a surface from a band needs OpenVDB: {error}; or set band to none, or surface to none"
             ) from error
         return _by_marching_cubes(values, level)
     beyond = values.outer.max() if isinstance(values, Blocks) else values.max()
@@ -35,7 +35,7 @@ def need_quads() -> None:
     try:
         load_openvdb()
     except MissingDependency as error:
-        raise MissingDependency(f"quads need OpenVDB: {error}; or ask for faces='triangles'") from error
+        raise MissingDependency(f"quads need OpenVDB: {error}; or set faces to triangles") from error
 
 
 def _by_marching_cubes(values, level):
@@ -44,7 +44,7 @@ def _by_marching_cubes(values, level):
     except ModuleNotFoundError as error:
         raise MissingDependency(
             "a surface needs OpenVDB or scikit-image and neither is installed; run inside Blender, "
-            "`pip install scikit-image`, or ask for surface='none'"
+            "`pip install scikit-image`, or set surface to none"
         ) from error
     padded = np.pad(values, 1, constant_values=values.max())
     vertices, faces, _, _ = marching_cubes(padded, level, gradient_direction="descent", allow_degenerate=False)

@@ -109,5 +109,5 @@ def test_dense_points_are_refused_before_the_directions_drown():
 
 
 def test_with_transport_it_is_refused_in_a_line():
-    with pytest.raises(SettingsError, match="integration='poisson'"):
+    with pytest.raises(SettingsError, match="set integration to poisson"):
         Settings(diffusion="grid")

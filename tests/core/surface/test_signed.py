@@ -121,7 +121,7 @@ def test_places_are_told_far_from_the_origin():
 def test_an_open_shape_is_refused_with_the_reason_and_a_place(shape):
     points = getattr(shapes, shape)(1500) * 10 + 100
     with pytest.raises(
-        InputError, match=r"not closed: .* \d+ border samples.*surface='single'.*bridge \(now 3\)"
+        InputError, match=r"not closed: .* \d+ border samples.*set surface to single.*bridge \(now 3\)"
     ) as told:
         signed(points)
     assert "\n" not in str(told.value)
@@ -177,7 +177,7 @@ def test_a_spanned_opening_is_smooth():
 
 
 def test_a_wall_inside_is_refused():
-    with pytest.raises(InputError, match=r"inner walls.*surface='single'"):
+    with pytest.raises(InputError, match=r"inner walls.*set surface to single"):
         signed(np.concatenate([shapes.cube(2400), shapes.square(400)]))
 
 

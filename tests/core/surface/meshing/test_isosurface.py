@@ -79,7 +79,7 @@ def test_openvdb_closes_what_leaves_the_box():
 def test_without_either_library_the_message_names_the_ways_out(monkeypatch):
     monkeypatch.setattr(MODULE, "load_openvdb", missing)
     monkeypatch.setitem(sys.modules, "skimage.measure", None)
-    with pytest.raises(MissingDependency, match=r"scikit-image.*surface='none'"):
+    with pytest.raises(MissingDependency, match=r"scikit-image.*set surface to none"):
         isosurface(ball(), 5.0)
 
 
@@ -105,5 +105,5 @@ def test_blocks_give_the_surface_of_the_whole_box(level):
 
 def test_blocks_need_openvdb(monkeypatch):
     monkeypatch.setattr(MODULE, "load_openvdb", missing)
-    with pytest.raises(MissingDependency, match=r"band needs OpenVDB.*surface='none'"):
+    with pytest.raises(MissingDependency, match=r"band needs OpenVDB.*set band to none, or surface to none"):
         isosurface(in_blocks(np.minimum(ball(), 3)), 1.0)
