@@ -72,9 +72,11 @@ def suits() -> int:
 
 def _selected(context):
     objects = points_in.sources(context)
+    final = [obj.evaluated_get(context.evaluated_depsgraph_get()) for obj in objects]
+    places = [[tuple(row) for row in (*obj.matrix_world, *obj.bound_box)] for obj in final]
     names = [(obj.session_uid, obj.mode) for obj in objects]
     stored = context.scene.vad
-    return names, points_in.point_count(objects, context), chosen(stored)["selected_only"], stored.outliers
+    return names, places, points_in.point_count(objects, context), chosen(stored)["selected_only"], stored.outliers
 
 
 class VAD_OT_estimate(run.Run, bpy.types.Operator):

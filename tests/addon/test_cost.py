@@ -65,6 +65,19 @@ def test_the_answer_follows_the_settings_and_goes_with_the_points(blender, exten
     assert cost.lines(blender.context) == []
 
 
+def test_the_answer_goes_where_the_points_were_moved_apart(blender, extension, add_mesh, sphere):
+    cost, scan = extension("vad_addon.cost"), add_mesh("Scan", sphere)
+    for how in ("nothing", "scaled", "others"):
+        blender.ops.vad.estimate()
+        if how == "scaled":
+            scan.scale = 3, 3, 3
+        elif how == "others":
+            scan.data.vertices.foreach_set("co", np.float32(sphere * [1, 1, 2]).ravel())
+            scan.data.update()
+        blender.context.view_layer.update()
+        assert bool(cost.lines(blender.context)) == (how == "nothing")
+
+
 def test_strays_count_where_they_stay(blender, extension, add_mesh, sphere):
     cost, stored = extension("vad_addon.cost"), blender.context.scene.vad
     add_mesh("Scan", np.vstack([sphere, [[1000, 0, 0]]]))
