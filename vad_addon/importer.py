@@ -15,7 +15,7 @@ EXTENSIONS = ".xyz", ".pts", ".txt", ".csv"
 
 
 class VAD_OT_import_points(bpy.types.Operator, ImportHelper):
-    """Load points from text files, one a line, with colours and other named columns, as meshes of loose vertices"""
+    """Load points from text files, one a line, with colors and other named columns, as meshes of loose vertices"""
 
     bl_idname = "vad.import_points"
     bl_label = "Import Points"

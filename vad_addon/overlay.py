@@ -38,18 +38,18 @@ class VAD_PG_overlay(bpy.types.PropertyGroup):
         name="Width", description="Width of a line in pixels", default=1.5, min=1.0, max=20.0, soft_max=5.0
     )
     colour_by: bpy.props.EnumProperty(
-        name="Colour",
-        description="What colours the lines",
+        name="Color",
+        description="What colors the lines",
         items=[
-            ("SINGLE", "Single", "The colour chosen below"),
+            ("SINGLE", "Single", "The color chosen below"),
             ("DIRECTION", "Direction", "Red, green and blue for the x, y and z part of the axis"),
             ("CONFIDENCE", "Confidence", "From red, where the neighbours disagree on the axis, to green"),
         ],
         update=_changed,
     )
     colour: bpy.props.FloatVectorProperty(
-        name="Line Colour",
-        description="Colour of the lines",
+        name="Line Color",
+        description="Color of the lines",
         subtype="COLOR_GAMMA",
         size=4,
         min=0.0,
@@ -59,7 +59,7 @@ class VAD_PG_overlay(bpy.types.PropertyGroup):
     )
     fixed_colour: bpy.props.FloatVectorProperty(
         name="Fixed Axes",
-        description="Colour of the axes that are fixed by hand",
+        description="Color of the axes that are fixed by hand",
         subtype="COLOR_GAMMA",
         size=4,
         min=0.0,

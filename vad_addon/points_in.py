@@ -128,8 +128,9 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
     points = np.concatenate([cloud[0] for cloud in clouds])
     name = objects[0].name if len(objects) == 1 else f"{objects[0].name} and {len(objects) - 1} more"
     if not len(points):
-        what = "selected points" if selected_only and in_edit_mode(objects[0]) else "points"
-        raise InputError(f"{name} has 0 {what}: select an object with vertices or points")
+        if selected_only and in_edit_mode(objects[0]):
+            raise InputError(f"{name} has 0 selected points: select some in edit mode, or use all")
+        raise InputError(f"{name} has 0 points: select an object with vertices or points")
     if len(points) < MINIMUM_SAMPLES and any(_has_instances(obj, context) for obj in objects):
         raise InputError(
             f"{name} has {len(points)} points, the origins of instances: add Realize Instances at the end of its "
@@ -153,7 +154,7 @@ def _left_out(objects, carried, context):
     names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
     names += [group.name for obj in objects for group in obj.vertex_groups]
     if lost := sorted(set(names) - set(carried)):
-        yield f"Not carried over: {', '.join(lost)}; only numbers and colours of points are, no vertex groups"
+        yield f"Not carried over: {', '.join(lost)}; only numbers and colors of points are, no vertex groups"
 
 
 def _instances_with_points(geometry):

@@ -5,6 +5,8 @@ import bpy
 from ..core.settings import Settings, default_in_words, options
 from .overlay import VAD_PG_overlay
 
+_SPELT = {"pca": "PCA", "numpy": "NumPy", "cpu": "CPU", "cuda": "CUDA"}  # choices that are no words
+
 RUN_OPTIONS = {
     "selected_only": bpy.props.BoolProperty(
         name="Selected Points Only",
@@ -64,7 +66,7 @@ def setting_property(option, **keywords):
         default=default_in_words(option),
     )
     if metadata["choices"]:
-        items = [(choice, choice.title(), "") for choice in metadata["choices"]]
+        items = [(one, _SPELT.get(one, one.title()), meaning) for one, meaning in metadata["meanings"].items()]
         return bpy.props.EnumProperty(items=items, **keywords)
     if metadata["word"]:  # a number or the word: Settings takes numbers as text, too
         words = [metadata["word"]]

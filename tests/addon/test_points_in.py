@@ -340,7 +340,7 @@ def test_an_empty_selection_is_refused(blender, gather, add_mesh, sphere, extens
     add_mesh("Scan", sphere)
     blender.ops.object.mode_set(mode="EDIT")
     blender.ops.mesh.select_all(action="DESELECT")
-    with pytest.raises(extension("core.errors").InputError, match="Scan has 0 selected points"):
+    with pytest.raises(extension("core.errors").InputError, match="Scan has 0 selected points: select some in"):
         gather(selected_only=True)
 
 

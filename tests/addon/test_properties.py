@@ -22,8 +22,16 @@ def test_defaults_limits_and_help_are_those_of_settings(blender, options):
         assert metadata["unit"] in shown.description
         if metadata["choices"]:
             assert tuple(item.identifier for item in shown.enum_items) == metadata["choices"]
+            assert [item.description for item in shown.enum_items] == list(metadata["meanings"].values())
         elif metadata["limits"] and not metadata["word"]:
             assert (shown.hard_min, shown.hard_max) == pytest.approx(metadata["limits"], rel=1e-6)
+
+
+def test_choices_are_spelt_as_people_do(blender):
+    shown = [one for one in blender.context.scene.vad.bl_rna.properties if one.type == "ENUM"]
+    names = {item.name for one in shown for item in one.enum_items}
+    assert {"PCA", "NumPy", "CPU", "CUDA", "Double", "Torch"} <= names
+    assert {"Pca", "Numpy", "Cpu", "Cuda"}.isdisjoint(names)
 
 
 def test_the_operator_has_no_other_arguments_and_forgets_them(blender, options):
