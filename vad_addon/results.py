@@ -39,7 +39,12 @@ def member(collection: bpy.types.Collection, wanted: str) -> bpy.types.Object | 
     if MEMBERS not in collection:  # of an earlier version
         return next((obj for obj in collection.objects if role(obj) == wanted), None)
     obj = collection[MEMBERS].get(wanted)
-    return obj if obj is not None and obj.users_collection and role(obj) == wanted else None
+    return obj if obj is not None and role(obj) == wanted and _is_somewhere(obj, collection) else None
+
+
+def _is_somewhere(obj, likely):
+    """Whether `obj` is in the collection `likely`, or any other: a look through all takes long where there are many."""
+    return obj in likely.objects.values() or bool(obj.users_collection)
 
 
 def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -55,9 +60,10 @@ def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
 def run_of(obj: bpy.types.Object) -> bpy.types.Collection | None:
     """The collection of the run that `obj` is a result of, wherever it was moved; else the one that it is in; else that
     of the result that it follows."""
-    homes = [collection for collection in obj.users_collection if REPORT in collection]
-    runs = [collection for collection in (*homes, *bpy.data.collections) if MEMBERS in collection]
-    found = [run for run in runs if role(obj) in ROLES and obj in members(run)] or homes
+    runs = [collection for collection in bpy.data.collections if REPORT in collection]
+    homes = [run for run in runs if obj in run.objects.values()]
+    known = [run for run in (*homes, *runs) if MEMBERS in run] if role(obj) in ROLES else []
+    found = [run for run in known if obj in members(run)] or homes
     if not found and role(obj) is not None and obj.parent is not None:
         return run_of(obj.parent)
     return found[0] if found else None
@@ -112,22 +118,26 @@ def estimate(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bpy.typ
     return next((obj for obj in found if _is_own(obj) and not are_edited([obj])), None)
 
 
+def _runs_of(scene, wanted):
+    """The runs in `scene` whose sources are `wanted`, a function, in the order of its collections."""
+    found = {one for one in bpy.data.collections if (NAMES in one or SOURCE in one) and wanted(sources(one))}
+    return [one for one in scene.collection.children_recursive if one in found] if found else []
+
+
 def previous(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bpy.types.Collection | None:
     """The results that an earlier run made of just these objects in this scene; the latest where several were kept."""
-    made = [
-        collection
-        for collection in scene.collection.children_recursive
-        if set(sources(collection)) == set(objects) and can_be_updated(collection)
-    ]
+    if not objects:
+        return None
+    made = list(filter(can_be_updated, _runs_of(scene, lambda made_from: set(made_from) == set(objects))))
     return scene.vad.result if scene.vad.result in made else (made or [None])[-1]
 
 
 def joined(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Collection | None:
     """The latest results that a run made of `obj`, or of several objects that it is one of; the last run's may be out
     of the scene."""
-    last = [scene.vad.result] if scene.vad.result is not None else []
-    made = [collection for collection in (*last, *scene.collection.children_recursive) if obj in sources(collection)]
-    return made[-1] if made else None
+    made = _runs_of(scene, lambda made_from: obj in made_from)
+    last = scene.vad.result
+    return made[-1] if made else last if last is not None and obj in sources(last) else None
 
 
 def is_editable(block: bpy.types.ID) -> bool:

@@ -560,6 +560,25 @@ def test_a_result_is_no_scan_though_its_own_is_gone(blender, run, scan, role):
     assert blender.context.scene.vad.result == collection
 
 
+@pytest.mark.parametrize("active", ["scan", "surface", "other"])
+def test_of_many_collections_only_those_of_runs_are_looked_into(
+    blender, run, scan, add_mesh, sphere, extension, monkeypatch, active
+):
+    results, read, walked = extension("vad_addon.results"), [], []
+    objects = {"surface": run()["surface"], "scan": scan, "other": add_mesh("Other", sphere)}
+    for _ in range(300):
+        blender.context.scene.collection.children.link(blender.data.collections.new("Plain"))
+    make_active(blender, objects[active])
+    names, of_object = results._names, blender.types.Object.users_collection.fget
+    monkeypatch.setattr(results, "_names", lambda holder: read.append(1) or names(holder))
+    walk = property(lambda obj: walked.append(1) or of_object(obj))
+    monkeypatch.setattr(blender.types.Object, "users_collection", walk)
+    found = extension("vad_addon.extras").chosen_result(blender.context)
+    assert found == (None if active == "other" else blender.context.scene.vad.result)
+    assert len(read) < 10
+    assert not walked
+
+
 def test_shells_that_were_moved_to_another_collection_still_follow(blender, run, scan, extension):
     run()
     blender.ops.vad.shell()
