@@ -1,6 +1,6 @@
 """From arrays to Blender's data-blocks. Each function makes exactly one and leaves nothing else behind."""
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import bpy
@@ -54,15 +54,32 @@ def volume_data(name: str, path: Path, active: str) -> bpy.types.Volume:
 
 
 def replace_data(old: bpy.types.ID, new: bpy.types.ID) -> None:
-    """Put `new` wherever `old` is used, under its name and with its materials, flat where it was, and remove `old`."""
+    """Put `new` wherever `old` is used, under its name and with its materials, custom properties and animation, flat
+    where it was, and remove `old`."""
     for material in old.materials:
         new.materials.append(material)
+    for name, value in old.items():
+        new[name] = value.to_dict() if hasattr(value, "to_dict") else value
+        with suppress(TypeError):  # not all can have limits and a tooltip
+            new.id_properties_ui(name).update_from(old.id_properties_ui(name))
+    if old.animation_data is not None:
+        _animate_alike(old.animation_data, new.animation_data_create())
+    new.use_fake_user = old.use_fake_user
     if isinstance(old, bpy.types.Mesh) and len(old.polygons) and not any(face.use_smooth for face in old.polygons):
         new.shade_flat()
     old.user_remap(new)
     name = old.name
     bpy.data.batch_remove([old])
     new.name = name
+
+
+def _animate_alike(before, now):
+    """Actions and drivers of one block's animation for that of another."""
+    now.action = before.action
+    if before.action is not None:
+        now.action_slot = before.action_slot
+    for curve in before.drivers:
+        now.drivers.from_existing(src_driver=curve)
 
 
 def replace_volume(old: bpy.types.Volume, new: bpy.types.Volume) -> None:

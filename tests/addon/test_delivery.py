@@ -200,6 +200,25 @@ def test_where_no_volume_can_be_written_the_earlier_one_stays_for_what_follows_i
     assert len(evaluated(blender, shell)[1].polygons) > 100
 
 
+def test_properties_and_animation_of_data_survive(blender, run, scan):
+    made = run()
+    for obj in (made["surface"], made["samples"]):
+        obj.data["asset"], obj.data["wear"], obj.data["more"] = "X42", 0.5, {"tags": [1, 2]}
+        obj.data.id_properties_ui("wear").update(min=0.0, max=1.0)
+        obj.data.keyframe_insert('["wear"]', frame=3)
+        driver = obj.data.driver_add('["more"]["tags"]', 1).driver
+        driver.expression = "40 + 2"
+        obj.data.use_fake_user = True
+    assert run(resolution=32) == made
+    for obj in (made["surface"], made["samples"]):
+        data = obj.data
+        assert (data["asset"], data["more"]["tags"][0], data.use_fake_user) == ("X42", 1, True)
+        assert data.id_properties_ui("wear").as_dict()["max"] == 1
+        animation = data.animation_data
+        assert animation.action_slot in set(animation.action.slots)
+        assert [curve.driver.expression for curve in animation.drivers] == ["40 + 2"]
+
+
 def test_materials_modifiers_and_places_survive(blender, run, scan):
     made = run()
     for obj in made.values():
