@@ -1,5 +1,6 @@
 """From the outcome of a run to objects in the scene."""
 
+import hashlib
 import json
 from contextlib import ExitStack
 from dataclasses import replace
@@ -27,7 +28,7 @@ def deliver(
 
     Where just these objects have results from an earlier run, these are updated (those in `collection` where it is
     given), and keep the materials and the modifiers that the user gave them; `keep_both` makes a second collection
-    instead.
+    instead. Meshes that the user changed are kept as objects of their own, hidden, with a warning.
     The field stays as it is where the outcome is made from its file.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
     for large coordinates. Of new results only the mesh is shown. A volume that cannot be written becomes a warning: the
@@ -53,6 +54,8 @@ def deliver(
             results.note_sources(collection, objects_of(source))
         rollback.pop_all()
     before, mesh = set(results.members(collection)), results.mesh(collection)
+    for changed in (obj for obj in before if results.MADE in obj and obj[results.MADE] != _digest(obj)):
+        warnings.append(_set_aside(scene, changed))
     _recast(collection, made)
     turned = results.note_turn(collection)
     looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
@@ -167,6 +170,35 @@ def _place(collection, role, data, origin, turned):
         results.place(obj, origin, turned)
     if role != results.FIELD:
         obj[results.BOX] = _box(data)
+    if role in results.MESHES:
+        obj[results.MADE] = _digest(obj)
+
+
+def _digest(obj):
+    """A text that tells meshes apart by their points and faces, what these carry and their shapes; not by materials,
+    nor by whether they are smooth."""
+    mesh, corners = obj.data, np.empty(len(obj.data.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    carried = {name: found.values for name, found in sorted(attributes.read(mesh).items())}
+    there = (one for one in mesh.attributes if not one.name.startswith(".") and one.name != "sharp_face")
+    names = sorted((one.name, one.domain, one.data_type) for one in there)
+    shapes_of = mesh.shape_keys.key_blocks.keys() if mesh.shape_keys else []
+    digest = hashlib.blake2b(repr((names, obj.vertex_groups.keys(), shapes_of)).encode(), digest_size=16)
+    for values in (attributes.values(mesh.attributes["position"]), corners, *carried.values()):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def _set_aside(scene, obj):
+    """Keep a result that the user changed, hidden, as an object that no run replaces; a line that says so."""
+    kept = obj.copy()
+    kept.data = obj.data.copy()
+    kept.name = kept.data.name = f"{obj.name} changed"
+    for name in (results.ROLE, results.ORIGIN, results.BOX, results.MADE):
+        kept.pop(name, None)
+    scene.collection.objects.link(kept)
+    results.show(scene, kept, False)
+    return f"{obj.name} was changed since it was made: {kept.name}, hidden, keeps what it was"
 
 
 def moved_within(obj: bpy.types.Object) -> bool:

@@ -8,6 +8,7 @@ from mathutils import Matrix
 
 ROLE, ORIGIN = "vad_role", "vad_origin"  # of an object; the second is the place that its data is relative to
 BOX = "vad_box"  # of an object: number of its points and the corners of their box, as they were made
+MADE = "vad_made"  # of a mesh object: a digest of its data as it was made
 SAMPLES, SURFACE, SHEET, FIELD = ROLES = "samples", "surface", "sheet", "field"
 MESHES = SURFACE, SHEET
 ESTIMATE = "estimate"  # samples with normals alone, made without a run; the sources are its own properties

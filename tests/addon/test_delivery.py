@@ -269,6 +269,60 @@ def test_an_object_whose_transforms_were_applied_is_placed_anew(blender, run, sc
     assert positions(surface.data).mean(axis=0)[2] + surface.location.z == pytest.approx(10, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("how", "then"),
+    [
+        *(("sculpted", "double"), ("joined", "double"), ("joined", "single"), ("joined", "none")),
+        *(("painted", "double"), ("unwrapped", "single"), ("weighted", "none"), ("keyed", "double")),
+    ],
+)
+def test_a_mesh_that_the_user_changed_is_kept_beside_the_next(
+    blender, run, scan, add_mesh, sphere, extension, how, then
+):
+    surface = run()["surface"]
+    if how == "sculpted":
+        surface.data.vertices[7].co *= 0.99
+    elif how == "joined":
+        make_active(blender, surface, add_mesh("Second", sphere + 3))
+        blender.ops.object.join()
+    elif how == "painted":
+        surface.data.attributes["Col"].data[7].color = 1, 0, 0, 1
+    elif how == "unwrapped":
+        surface.data.uv_layers.new(name="UVMap")
+    elif how == "weighted":
+        surface.vertex_groups.new(name="Soft").add([7], 1.0, "REPLACE")
+    else:
+        surface.shape_key_add(name="Basis")
+    count, objects = len(surface.data.vertices), set(blender.data.objects)
+    make_active(blender, scan)
+    run(surface=then)
+    (kept,) = (obj for obj in set(blender.data.objects) - objects)
+    assert (kept.name, kept.get("vad_role"), len(kept.data.vertices)) == ("Scan surface changed", None, count)
+    assert (kept.hide_get(), kept.hide_render) == (True, True)
+    assert {"unwrapped": "UVMap" in kept.data.uv_layers, "keyed": kept.data.shape_keys is not None}.get(how, True)
+    warnings = extension("vad_addon.results").warnings(blender.context.scene.vad.result)
+    assert warnings == ["Scan surface was changed since it was made: Scan surface changed, hidden, keeps what it was"]
+    run(surface=then)
+    assert extension("vad_addon.results").warnings(blender.context.scene.vad.result) == []
+    assert kept.name in blender.context.scene.objects
+    make_active(blender, kept)
+    assert extension("vad_addon.points_in").sources(blender.context) == [kept]
+
+
+def test_of_a_mesh_that_looks_otherwise_alone_nothing_is_kept(blender, run, scan):
+    made = run()
+    made["surface"].data.shade_flat()
+    made["surface"].data.materials.append(blender.data.materials.new("Mine"))
+    made["surface"].modifiers.new("Mine", "SMOOTH")
+    made["surface"].scale = 2, 2, 2
+    blender.ops.wm.save_mainfile()
+    blender.ops.wm.open_mainfile(filepath=blender.data.filepath)
+    before = set(blender.data.objects)
+    make_active(blender, blender.data.objects["Scan"])
+    run()
+    assert set(blender.data.objects) == before
+
+
 def test_an_object_that_was_edited_stays_where_the_user_put_it(blender, run, scan):
     surface = run()["surface"]
     surface.location.x += 3
