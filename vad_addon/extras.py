@@ -14,7 +14,8 @@ def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
     obj = points_in.active_object(context)
     if obj is None:
         return context.scene.vad.result
-    found = results.run_of(obj) or results.previous(context.scene, points_in.sources(context))
+    own = None if results.is_copy(obj) else results.run_of(obj)
+    found = own or results.previous(context.scene, points_in.sources(context))
     if found is not None or obj.type in points_in.READABLE:
         return found or results.joined(context.scene, obj)
     return context.scene.vad.result

@@ -48,9 +48,11 @@ def active_object(context: bpy.types.Context) -> bpy.types.Object | None:
 
 def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects to reconstruct: those selected, the active one first. Where these are results of earlier runs only,
-    what the first was made from, so that a run can be repeated with its results at hand."""
+    what the first was made from, so that a run can be repeated with its results at hand. Copies of results count as
+    any object does."""
     chosen = _chosen(context)
-    if scans := [obj for obj in chosen if obj.type in READABLE and results.role(obj) is None]:
+    readable = (obj for obj in chosen if obj.type in READABLE)
+    if scans := [obj for obj in readable if results.role(obj) is None or results.is_copy(obj)]:
         return scans
     origins = [source for obj in chosen[:1] for source in results.origins(obj, context.scene)]
     return [obj for obj in origins if obj.type in READABLE]

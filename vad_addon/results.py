@@ -70,6 +70,12 @@ def run_of(obj: bpy.types.Object) -> bpy.types.Collection | None:
     return found[0] if found else None
 
 
+def is_copy(obj: bpy.types.Object) -> bool:
+    """Whether `obj` is a copy, or a part, that the user made of a result: another object plays its role in its run."""
+    run = run_of(obj) if role(obj) in ROLES else None
+    return run is not None and member(run, role(obj)) not in {None, obj}
+
+
 def shown_as(collection: bpy.types.Collection, name: str) -> list[bpy.types.Object]:
     """The objects that one of SHOWN stands for."""
     return [obj for obj in ([member(collection, name)] if name in ROLES else sources(collection)) if obj is not None]

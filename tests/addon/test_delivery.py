@@ -663,6 +663,36 @@ def test_shells_that_were_moved_to_another_collection_still_follow(blender, run,
     assert shell.modifiers[0].grid_name == "sdf"
 
 
+@pytest.mark.parametrize("how", ["duplicated", "separated"])
+def test_a_copy_of_a_result_can_be_reconstructed_itself(blender, run, scan, extension, how):
+    made, collection = run(), blender.context.scene.vad.result
+    make_active(blender, made["surface"])
+    if how == "duplicated":
+        blender.ops.object.duplicate()
+        copy = blender.context.active_object
+    else:
+        blender.ops.object.mode_set(mode="EDIT")
+        blender.ops.mesh.select_all(action="DESELECT")
+        blender.ops.object.mode_set(mode="OBJECT")
+        for face in made["surface"].data.polygons:
+            face.select = face.center.z > 0
+        blender.ops.object.mode_set(mode="EDIT")
+        blender.ops.mesh.separate(type="SELECTED")
+        blender.ops.object.mode_set(mode="OBJECT")
+        (copy,) = set(blender.context.selected_objects) - {made["surface"]}
+    make_active(blender, copy)
+    chosen = extension("vad_addon.extras").chosen_result
+    assert extension("vad_addon.points_in").sources(blender.context) == [copy]
+    assert chosen(blender.context) is None
+    assert blender.ops.vad.reconstruct(resolution=16) == {"FINISHED"}
+    of_copy = blender.context.scene.vad.result
+    assert of_copy.name == f"{copy.name} VAD"
+    assert chosen(blender.context) == of_copy
+    make_active(blender, made["surface"])
+    assert extension("vad_addon.points_in").sources(blender.context) == [scan]
+    assert chosen(blender.context) == collection
+
+
 def test_a_copy_of_a_result_is_the_users_though_the_result_was_deleted(blender, folder, run, scan, extension):
     surface = run()["surface"]
     make_active(blender, surface)
