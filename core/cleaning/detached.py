@@ -12,6 +12,7 @@ _OF_ALL, _OF_LARGEST = 0.02, 0.1  # of all samples, and of the largest part: lar
 _LOOKS = 256  # samples of a part whose wider neighbourhoods are looked at
 _FURTHER = 64  # samples nearest to each of a part, itself among them
 _BESIDE = 3.5  # spacings of either, others of these closer than that are beside the part
+_FACING = 0.06  # of its samples, at least, have such others
 _ENOUGH = 16  # samples, of which fewer do not tell a shell from a cloud
 _HULL = 0.95, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
 _CHUNK = 8192  # samples
@@ -51,15 +52,17 @@ def _parts(around):
 
 
 def _beside_others(around, part, marked, progress):
-    """The numbers of the parts `marked` (p,) that lie beside others, which are not: at the end of a thin part the eight
-    nearest neighbours of each sample may be of that end, though others are hardly further."""
+    """The numbers of the parts `marked` (p,) that lie beside others, which are not, with more than a few samples: at
+    the end of a thin part the eight nearest neighbours of each sample may be of that end, though others are hardly
+    further. A clump that hovers over a surface has its lowest samples near it alone."""
     rows, spacing = np.flatnonzero(marked[part]), around.spacing
     found, k = np.zeros(len(rows), bool), range(1, 1 + min(_FURTHER, len(part)))
     for some in progress.chunks(len(rows), _CHUNK):
         distance, other = around.tree.query(around.points[rows[some]], k=k, workers=-1)
         close = distance < _BESIDE * np.minimum(spacing[rows[some], None], spacing[other])
         found[some] = (close & ~marked[part[other]]).any(axis=1)
-    return part[rows[found]]
+    facing, size = (np.bincount(part[some], minlength=len(marked)) for some in (rows[found], rows))
+    return np.flatnonzero(facing >= _FACING * np.maximum(size, 1))
 
 
 def _is_sheet(points):

@@ -231,3 +231,15 @@ def test_of_many_small_bodies_none_goes():
 def test_one_far_sample_is_found(far):
     points, stray = with_strays(np.array([[far, 0, 0]]))
     np.testing.assert_array_equal(find_outliers(points), stray)
+
+
+def test_clumps_that_hover_over_a_surface_are_found():
+    """The lowest of their samples are as near to it as others are to each other, but few are."""
+    rng, spacing = np.random.default_rng(1), np.sqrt(4 * np.pi / 20000)
+    clumps = []
+    for up in shapes.sphere(12):
+        clump = 0.02 * rng.normal(size=(60, 3))
+        clumps.append(clump + (1 + 3.4 * spacing - (clump @ up).min()) * up)
+    stray = find_outliers(np.concatenate([shapes.scattered_sphere(20000), *clumps]))
+    assert stray[:20000].sum() <= 1
+    assert stray[20000:].all()
