@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from core.cleaning.offsets import MAX_ROUNDS, SETTLED
 from core.cleaning.positions import LONGEST_MOVE
 from core.io.atomic import atomic_path, writable_folder
 from core.io.report import write_report
 
 from . import noise_cost, noise_uneven, noise_wires, published
 from . import noise_tables as tables
+from .alternation import MAX_ROUNDS, SETTLED
 from .cases import SAMPLINGS, SPOILED, Case, find_cases, has_sampling, load_case
 from .noise_hostile import RESOLUTION, fuzzed, tried
 from .noise_measure import (
@@ -76,7 +76,7 @@ Gaussian noise in every coordinate, its standard deviation in per cent of the lo
 
 - *here*: `denoise="auto"`. Every sample is projected onto robust quadrics through its neighbours, as many as the data
   ask for; none moves further than {longest:g} standard deviations of the noise estimated around it.
-- *alternation*: the paper's optimisation of positions and normals by turns (`core.cleaning.offsets`), with its energy
+- *alternation*: the paper's optimisation of positions and normals by turns (`benchmarks.alternation`), with its energy
   for the positions and the reflection sweeps for the normals, until the largest tenth of the changes of the axes
   average below {settled} (at most {rounds} rounds); then the rest of the method, on these positions and normals.
 - *jet, front*: CGAL's jet smoothing over {jet} neighbours, then its advancing front.

@@ -8,11 +8,11 @@ import numpy as np
 
 from core import Mesh, Reconstruction, Settings, reconstruct
 from core.cleaning.noise import noisy_samples
-from core.cleaning.offsets import alternate
 from core.normals.pca import pca_normals
 from core.points import local_spacing, prepare_samples
 from scripts.render import vertex_normals
 
+from .alternation import alternate
 from .cases import Case
 from .geometry import closest_points, face_normals, surface_samples
 from .metrics import surface_errors, topology

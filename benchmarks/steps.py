@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.collections import LineCollection
 
 from core import Settings, local_spacing, reconstruct
-from core.cleaning.offsets import best_moves
 from core.normals.estimate import estimate_normals
 from scripts.picture import ACCENT, DISTANCES, INK, QUIET, draw_cut, plane_section
 
 from . import plane
+from .alternation import best_moves
 from .geometry import closest_points
 from .pictures import View, caption, draw_surface, save, sheet
 from .sampling import blue_noise

@@ -4,5 +4,4 @@ surroundings, detached, far_parts, off_wires, outliers : which samples are stray
 anchors, flat_patches, roughness, thin_walls, voxels   : what looks noisy, and what only seems so or surely is
 noise                                                  : which are noisy
 noise_level, positions, depth_steps                    : how noisy, and where those lie without the noise
-offsets                                                : the paper's own way, the reference beside that
 """

@@ -1,7 +1,8 @@
 """Noisy samples, moved onto the surface that their neighbours share.
 
-The paper alternates between normals and offsets along them (section 4.3, here `offsets`) on the Voronoi diagram, which
-noise breaks first. Robust quadrics through the neighbours need no diagram, and their normals come with them.
+The paper alternates between normals and offsets along them (section 4.3, `benchmarks.alternation`) on the Voronoi
+diagram, which noise breaks first. Robust quadrics through the neighbours need no diagram, and their normals come with
+them.
 """
 
 import numpy as np

@@ -1,6 +1,5 @@
 """Runs that several test modules look at; none of them changes what it is given."""
 
-import numpy as np
 import pytest
 
 from core import Settings, reconstruct
@@ -45,8 +44,3 @@ def torus_run():
 def sheets_run():
     """Two squares of side 2, a tenth apart: more than two cells, less than two local spacings."""
     return reconstruct(shapes.sheets(2000, gap=0.1), Settings(resolution=RESOLUTION, offset=0.5))
-
-
-@pytest.fixture
-def random():
-    return np.random.default_rng(0)

@@ -19,15 +19,14 @@ L-BFGS instead of Adam, as it needs no rate.
 import numpy as np
 from scipy.optimize import minimize
 
-from ..linalg import inner, row_dots
-from ..normals.energy import EnergyWeights, NormalEnergy
-from ..normals.estimate import estimate_normals
-from ..points import local_spacing
-from ..progress import Progress
-from ..settings import Settings
-from ..voronoi.bisectors import BisectorSamples, bisector_samples
-from ..voronoi.clusters import near_cluster
-from ..voronoi.polygons import facet_polygons
+from core import Settings, local_spacing
+from core.linalg import inner, row_dots
+from core.normals.energy import EnergyWeights, NormalEnergy
+from core.normals.estimate import estimate_normals
+from core.progress import Progress
+from core.voronoi.bisectors import BisectorSamples, bisector_samples
+from core.voronoi.clusters import near_cluster
+from core.voronoi.polygons import facet_polygons
 
 REGULARISATION = 0.5  # lambda_p
 SETTLED = 0.3  # mean of the largest tenth of the axes' changes at which the alternation ends

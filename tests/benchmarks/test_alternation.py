@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from benchmarks.alternation import MAX_ROUNDS, SETTLED, OffsetEnergy, alternate, best_moves, largest_changes
 from core import Cancelled, Settings
-from core.cleaning.offsets import MAX_ROUNDS, SETTLED, OffsetEnergy, alternate, best_moves, largest_changes
 from core.normals.energy import EnergyWeights
 from core.points import local_spacing
 from core.voronoi.bisectors import bisector_samples
