@@ -12,7 +12,7 @@ from core import Mesh
 from core.cleaning.clean import clean
 from core.linalg import outer, principal_axes
 from core.normals.adam import MAX_STEPS, minimise
-from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
+from core.normals.energy import EnergyWeights, NormalEnergy
 from core.normals.estimate import estimate_normals, swept_normals
 from core.normals.mirrors import Mirrors
 from core.normals.pca import pca_normals
@@ -83,7 +83,9 @@ class Problem:
         return minimise(energy.value_and_gradient, start, max_steps=max_steps)[0]
 
     def random_start(self) -> np.ndarray:
-        return random_axes(len(self.points), seed=0)
+        """Uniform unit axes, the paper's start."""
+        axes = np.random.default_rng(0).normal(size=self.points.shape)
+        return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
     def agreement(self, axes: np.ndarray) -> dict:
         return normal_agreement(axes, self.normals, self.given, self.nm_curve)

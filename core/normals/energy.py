@@ -115,11 +115,5 @@ class NormalEnergy:
         return terms, np.stack([distance, gradient, alignment])
 
 
-def random_axes(count: int, seed: int) -> np.ndarray:
-    """(count,3) uniform unit axes, the paper's start."""
-    axes = np.random.default_rng(seed).normal(size=(count, 3))
-    return axes / np.linalg.norm(axes, axis=1, keepdims=True)
-
-
 def _scatter(index, n):
     return sparse.csr_matrix((np.ones(len(index)), (index, np.arange(len(index)))), shape=(n, len(index)))

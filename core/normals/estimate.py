@@ -34,9 +34,9 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     constraints : (indices (k,), axes (k,3) of any length) held fixed, or None
     Returns normals (n,3), confidence (n,) in [0,1] and a dict for the report.
 
-    The energy starts from the same Voronoi-weighted plane fit as the sweeps. The paper starts it from random axes
-    (`random_axes`), from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and
-    .975 instead of .970, .989 and .9999.
+    The energy starts from the same Voronoi-weighted plane fit as the sweeps. The paper starts it from random axes,
+    from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and .975 instead of
+    .970, .989 and .9999.
 
     Raises :class:`InputError` for fewer than 4 points, points that are not finite or occur twice (but the plain plane
     fit takes such), spacings that are none, and constraints as :func:`checked_constraints` does,

@@ -3,8 +3,8 @@ import pytest
 
 from core import Cancelled
 from core.normals.adam import MAX_STEPS, minimise
-from core.normals.energy import random_axes
 from tests import shapes
+from tests.shapes import scattered_sphere as random_axes
 
 TARGETS = random_axes(50, 9)
 

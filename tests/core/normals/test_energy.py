@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from core.normals import energy as module
-from core.normals.energy import EnergyWeights, NormalEnergy, random_axes
+from core.normals.energy import EnergyWeights, NormalEnergy
 from core.normals.energy_torch import torch_value_and_gradient
 from core.points import local_spacing
 from core.voronoi.bisectors import BisectorSamples, bisector_samples
 from core.voronoi.facets import Facets
 from core.voronoi.polygons import facet_polygons
 from tests import shapes
+from tests.shapes import scattered_sphere as random_axes
 
 EACH = [EnergyWeights(1, 0, 0), EnergyWeights(0, 1, 0), EnergyWeights(0, 0, 1), EnergyWeights(1, 0.1, 0.5)]
 
@@ -100,10 +101,3 @@ def test_printed_alignment_pulls_axes_of_a_border_into_the_surface():
 
     assert own(printed, inward) < own(printed, across)
     assert own(corrected, across) < own(corrected, inward)
-
-
-def test_random_axes_are_unit_uniform_and_reproducible():
-    axes = random_axes(20_000, 1)
-    np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0)
-    np.testing.assert_allclose(axes.T @ axes / len(axes), np.eye(3) / 3, atol=0.01)
-    assert axes.tobytes() == random_axes(20_000, 1).tobytes() != random_axes(20_000, 2).tobytes()

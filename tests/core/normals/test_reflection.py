@@ -3,7 +3,7 @@ import pytest
 
 from core import Cancelled
 from core.normals.adam import minimise
-from core.normals.energy import NormalEnergy, random_axes
+from core.normals.energy import NormalEnergy
 from core.normals.mirrors import Mirrors
 from core.normals.reflection import reflection_sweeps
 from core.points import local_spacing
@@ -11,6 +11,7 @@ from core.voronoi.bisectors import bisector_samples
 from core.voronoi.facets import voronoi_facets
 from core.voronoi.polygons import facet_polygons
 from tests import shapes
+from tests.shapes import scattered_sphere as random_axes
 
 
 def sweeps(points, constraints=None, start=None):
