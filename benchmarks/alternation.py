@@ -23,9 +23,9 @@ from core import Settings, local_spacing
 from core.linalg import inner, row_dots
 from core.normals.energy import EnergyWeights, NormalEnergy
 from core.normals.estimate import estimate_normals
+from core.normals.near_cluster import near_cluster
 from core.progress import Progress
 from core.voronoi.bisectors import BisectorSamples, bisector_samples
-from core.voronoi.clusters import near_cluster
 from core.voronoi.polygons import facet_polygons
 
 REGULARISATION = 0.5  # lambda_p

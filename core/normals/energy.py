@@ -26,7 +26,7 @@ from scipy import sparse
 
 from ..linalg import inner, row_dots
 from ..voronoi.bisectors import BisectorSamples
-from ..voronoi.clusters import near_cluster
+from .near_cluster import near_cluster
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from core.voronoi.clusters import near_cluster
+from core.normals.near_cluster import near_cluster
 
 groups = st.lists(st.lists(st.floats(0, 100), min_size=1, max_size=9), min_size=1, max_size=6)
 
