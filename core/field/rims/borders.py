@@ -21,7 +21,7 @@ from ...parts import connected_parts
 from ...progress import Progress
 from ...records import joined
 from ..curvature import sag
-from .walls import walled
+from .walls_beside_gaps import walled
 
 GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings

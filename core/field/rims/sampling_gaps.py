@@ -24,7 +24,7 @@ from ...parallel import in_order
 from ...progress import Progress
 from ..curvature import sag
 from .borders import DISC, Rims, across_gaps, bridged_reach, chain_lengths, rows_at_a_time
-from .walls import walled
+from .walls_beside_gaps import walled
 
 _FEW = 4  # samples in a row that a wide gap in the sampling may have at its rim
 _MANY = 8  # samples in a row that only an opening has at its rim

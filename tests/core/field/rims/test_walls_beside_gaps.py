@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.field.rims.walls import walled
+from core.field.rims.walls_beside_gaps import walled
 from core.neighbourhoods.cloud import Cloud
 from tests.core.field.rims.test_sampling_gaps import UP, before_and_after, rims_of
 
