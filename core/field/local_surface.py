@@ -106,12 +106,12 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     spacing = spacing_of(points, spacing)
     given = points, normals, confidence, spacing, np.arange(len(points))
     local, cloud = _fitted(*given, bridge, None, progress.part(0.0, 0.9))
-    added = samples_beside_creases(local.rims, cloud)
+    added = samples_beside_creases(local.rims, cloud, progress.part(0.9, 0.92))
     if not len(added.beside):
         return local
     more = added.points, added.normals, confidence[added.beside], spacing[added.beside], added.beside
     given = (np.concatenate(pair) for pair in zip(given, more, strict=True))
-    return _fitted(*given, bridge, added, progress.part(0.9, 1.0))[0]
+    return _fitted(*given, bridge, added, progress.part(0.92, 1.0))[0]
 
 
 def _fitted(points, normals, confidence, spacing, source, bridge, added, progress):
