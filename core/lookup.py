@@ -30,6 +30,11 @@ def least_of_each(keys: np.ndarray, *costs: np.ndarray) -> np.ndarray:
     return order[np.diff(keys[order], prepend=-1) > 0]
 
 
+def sums_of_each(number: np.ndarray, rows: np.ndarray, count: int = 0) -> np.ndarray:
+    """The sums of the rows (m,k) that have each number from 0 on, (m,), `count` of them at least, (count,k) float64."""
+    return np.stack([np.bincount(number, x, count) for x in rows.T], axis=1)
+
+
 def edge_keys(edges: np.ndarray, n: int) -> np.ndarray:
     """One number for each undirected edge between n vertices, (e,2) -> (e,) int64."""
     a, b = edges.astype(np.int64).T

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..linalg import row_dots, tangent_frames
-from ..lookup import rows_of
+from ..lookup import rows_of, sums_of_each
 from .facets import Facets, by_blocks, clip_radius, facets_of, inside_ball, joined
 
 _ARC_STEP = 0.25  # radians; longest chord that stands for a piece of the clip circle
@@ -56,7 +56,7 @@ def _polygons(sides, points, spacing):
 
     count = np.bincount(facet, minlength=len(facets.pairs))
     middle = 0.5 * (tail + head)
-    mean = np.stack([np.bincount(facet, weights=x, minlength=len(count)) for x in middle.T], axis=1) / count[:, None]
+    mean = sums_of_each(facet, middle, len(count)) / count[:, None]
     order = np.lexsort((frame.angle(middle - mean[facet], facet), facet))
     facet, tail, head, leaves = facet[order], tail[order], head[order], leaves[order]
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.lookup import edge_keys, is_among, least_of_each, numbered, rows_of
+from core.lookup import edge_keys, is_among, least_of_each, numbered, rows_of, sums_of_each
 
 NUMBERS = arrays(np.int64, st.integers(0, 30), elements=st.integers(-5, 20))
 
@@ -40,6 +40,12 @@ def test_the_least_of_each_key_is_the_first_by_its_costs(rows):
     found = least_of_each(keys, first, second)
     ordered = sorted(range(len(rows)), key=lambda row: rows[row])
     assert found.tolist() == [next(row for row in ordered if rows[row][0] == key) for key in sorted(set(keys.tolist()))]
+
+
+def test_sums_of_each_number_are_those_of_its_rows(random):
+    number, rows = random.integers(0, 4, 50), random.normal(size=(50, 3))
+    found = sums_of_each(number, rows, 6)
+    np.testing.assert_allclose(found, [rows[number == each].sum(axis=0) for each in range(6)], atol=1e-14)
 
 
 def test_edges_have_one_key_either_way():

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...linalg import row_dots, solve_positive
+from ...lookup import sums_of_each
 
 
 def to_planes(vertices, corner, place, normal, stiffness: float) -> np.ndarray:
@@ -13,9 +14,8 @@ def to_planes(vertices, corner, place, normal, stiffness: float) -> np.ndarray:
     """
     offset = row_dots(normal, place - vertices[corner])
     matrix = np.zeros((len(vertices), 3, 3))
-    right = np.zeros((len(vertices), 3))
+    right = sums_of_each(corner, normal * offset[:, None], len(vertices))
     for a in range(3):
-        right[:, a] = np.bincount(corner, normal[:, a] * offset, len(vertices))
         for b in range(3):
             matrix[:, a, b] = np.bincount(corner, normal[:, a] * normal[:, b], len(vertices))
     weight = np.maximum(np.bincount(corner, minlength=len(vertices)), 1)

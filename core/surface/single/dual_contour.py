@@ -7,7 +7,7 @@ import numpy as np
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import shortened
-from ...lookup import numbered
+from ...lookup import numbered, sums_of_each
 from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
@@ -33,8 +33,7 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     progress = Progress.of(progress)
     quads, count, kind = shared_vertices(crossings, grid)
     corner, place = quads.reshape(-1), np.repeat(crossings.place, 4, axis=0)
-    weight = np.bincount(corner, minlength=count)
-    vertices = np.stack([np.bincount(corner, place[:, a], count) for a in range(3)], axis=1) / weight[:, None]
+    vertices = sums_of_each(corner, place, count) / np.bincount(corner, minlength=count)[:, None]
     meeting = kind > 0
     step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[meeting]
     vertices[meeting] += shortened(step, grid.spacing)
@@ -59,8 +58,7 @@ def _without_touches(mesh, cell):
     if not len(edges):
         return mesh
     vertex = connected_parts(*edges.T, len(mesh.vertices))
-    share = np.bincount(vertex)
-    vertices = np.stack([np.bincount(vertex, x) / share for x in mesh.vertices.T], axis=1)
+    vertices = sums_of_each(vertex, mesh.vertices) / np.bincount(vertex)[:, None]
     return _without_repeats(replace(mesh, vertices=vertices, faces=vertex[mesh.faces].astype(np.int32)))
 
 

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, row_dots, unit
-from ...lookup import edge_keys, numbered, rows_of
+from ...lookup import edge_keys, numbered, rows_of, sums_of_each
 from ...parts import connected_parts
 from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.fillings import fillings
@@ -120,7 +120,7 @@ def _doubled(mesh, border, loops):
     tail, head, start = mesh.vertices[corner], mesh.vertices[after], mesh.vertices[[loop[0] for loop in loops]][of]
     row = rows_of(edge_keys(np.stack([corner, after], axis=1), n), key)
     length = np.linalg.norm(head - tail, axis=1) * (row >= 0)
-    axis = unit(np.stack([np.bincount(of, x) for x in np.cross(tail - start, head - start).T], axis=1))
+    axis = unit(sums_of_each(of, np.cross(tail - start, head - start)))
     side = row_dots(unit(np.cross(head - tail, beyond[row] - tail)), axis[of])
     return np.bincount(of, length * side) / np.maximum(np.bincount(of, length), _TINY)
 

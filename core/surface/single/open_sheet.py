@@ -6,7 +6,7 @@ from ...field.blocks import Blocks
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
-from ...lookup import numbered
+from ...lookup import numbered, sums_of_each
 from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.first_steps import first_steps
@@ -64,7 +64,7 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
     share, bare = np.bincount(corner, minlength=len(vertices)), np.zeros(len(vertices), bool)
     bare[faces[~kept]] = True
     rim = np.flatnonzero(bare & (share > 0))
-    total = np.stack([np.bincount(corner, x, len(vertices)) for x in at.T], axis=1)
+    total = sums_of_each(corner, at, len(vertices))
     vertices = vertices.copy()
     vertices[rim] = total[rim] / share[rim, None]
     return _apart(*in_use(vertices, faces[kept]))

@@ -14,6 +14,7 @@ from scipy.sparse.linalg import spsolve
 
 from ...field.local_surface import LocalSurface
 from ...linalg import COMPONENTS, lengths, principal_axes, row_dots, shortened, unit
+from ...lookup import sums_of_each
 from ..mesh import Mesh, at_corners, face_normals
 from .rim_corners import Border
 
@@ -98,7 +99,7 @@ def _outward(mesh):
     size = np.linalg.norm(out, axis=1)
     out *= (np.sqrt(squared) / np.where(size > 0, size, 1.0))[:, None]
     ends = np.concatenate([tail, head])
-    return np.stack([np.bincount(ends, np.tile(out[:, a], 2), len(vertices)) for a in range(3)], axis=1)
+    return sums_of_each(ends, np.tile(out, (2, 1)), len(vertices))
 
 
 def _axes(mesh, row):
