@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from core.field.local_surface import fit_local_surface
 from core.field.rims.borders import RIM, chains, find_rims
@@ -46,6 +47,17 @@ def test_scattered_samples_of_a_square_give_its_sides():
     fixed = replace(surface, rims=plain)
     before = np.abs(fixed.project(x).distance - 0.1)
     assert off.mean() < 0.6 * before.mean()
+
+
+@pytest.mark.parametrize(("n", "seed"), [(400, 3), (400, 6), (3000, 1)])
+def test_rims_across_gaps_at_corners_stop_at_the_other_side(n, seed):
+    """Without that they ran out of the square by 2 to 2.6 mean distances between samples."""
+    surface, apart = surface_of(scattered(n, seed)), np.sqrt(1 / n)
+    at = np.arange(-4, 1 / apart + 4, 0.25) * apart
+    x = np.stack(np.meshgrid(at, at, [0.0]), axis=3).reshape(-1, 3)
+    away = np.linalg.norm(np.maximum(np.maximum(x - 1, -x), 0)[:, :2], axis=1)
+    x, away = x[(away > 0) & (away < 4 * apart)], away[(away > 0) & (away < 4 * apart)]
+    assert (surface.project(x).distance > away - apart).all()
 
 
 def test_a_gap_in_the_sampling_of_a_straight_rim_is_closed():
