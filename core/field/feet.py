@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import dots, row_dots
+from ..trees import quick_tree
 from .grid import Grid
 from .local_surface import LocalSurface, Projection
 from .projection import FROM_NODES
@@ -34,7 +35,7 @@ class Feet:
 
     @cached_property
     def tree(self) -> KDTree:
-        return KDTree(self.centres.T, balanced_tree=False, compact_nodes=False)
+        return quick_tree(self.centres.T)
 
     def offsets(self, x: np.ndarray, row: np.ndarray) -> list[np.ndarray]:
         """To x (3,...) float32 from the feet number `row` (...), three (...)."""

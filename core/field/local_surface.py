@@ -14,6 +14,7 @@ from ..neighbourhoods.cloud import Cloud
 from ..normals.known import known_normals
 from ..progress import Progress
 from ..settings import Settings
+from ..trees import k_nearest
 from .curvature import bending
 from .grid import Grid
 from .patches import Patches
@@ -85,7 +86,7 @@ class LocalSurface:
     def around(self, places: np.ndarray) -> np.ndarray:
         """The samples around places (m,3), whose median spacing is that of the place: the nearest 32, or all where
         there are fewer, (m,k) int."""
-        return self.tree.query(places, k=range(1, 1 + min(_AROUND, self.tree.n)), workers=-1)[1]
+        return k_nearest(self.tree, places, _AROUND, workers=-1)[1]
 
 
 def fit_local_surface(points, normals, confidence, spacing, bridge: float, progress=None) -> LocalSurface:

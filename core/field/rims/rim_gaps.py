@@ -16,6 +16,7 @@ from ...lookup import least_of_each
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
+from ...trees import k_nearest
 from .borders import one_sheet
 from .rim_fits import Beside, beside, lowest_lines
 from .sampling_gaps import largest_empty_area
@@ -53,7 +54,7 @@ def spacing_around(row, cloud: Cloud) -> tuple[np.ndarray, np.ndarray]:
     """The usual spacing around samples in `row` (r,), the median of the nearest 32, and whether these lie at random,
     (r,) bool, rather than evenly spaced."""
     points, spacing = cloud.points, cloud.spacing
-    near = cloud.tree.query(points[row], k=range(1, 1 + min(_USUAL, len(cloud))), workers=-1)[1]
+    near = k_nearest(cloud.tree, points[row], _USUAL, workers=-1)[1]
     some, at = np.unique(near, return_inverse=True)
     nearest = cloud.tree.query(points[some], k=[2], workers=-1)[0][:, 0] / spacing[some]
     at_random = np.median(nearest[at.reshape(near.shape)], axis=1) <= _RANDOM

@@ -16,6 +16,7 @@ from ...linalg import row_dots, unit
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
+from ...trees import k_nearest
 from .borders import RIM, Rims, chains, one_sheet
 from .rim_fits import beside, lowest_lines
 from .rim_gaps import RimGaps, find_rim_gaps, spacing_around
@@ -170,7 +171,7 @@ def _nearest_line(lines, other, cloud, across=None):
     off those at corners."""
     points, normals, spacing = cloud.points, cloud.normals, cloud.spacing
     most, reach = (_LINES, _REACH) if across is None else (_AT_CORNERS, _FAR_REACH)
-    far, near = KDTree(points[lines.row]).query(points[other], k=range(1, 1 + min(most, len(lines.row))), workers=-1)
+    far, near = k_nearest(KDTree(points[lines.row]), points[other], most, workers=-1)
     way, found = np.zeros((len(other), 3)), np.full(len(other), np.inf)
     for far_k, of in zip(far.T, near.T, strict=True):
         row = lines.row[of]

@@ -4,11 +4,11 @@ Both are pulled onto the surface, and where it bends the triangles of either are
 """
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ...linalg import cross, dots, lengths, unit
 from ...parallel import work_through
 from ...progress import Progress
+from ...trees import k_nearest, quick_tree
 from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.centring import Bend, bend_of
 
@@ -63,11 +63,11 @@ def _other_layer(mesh, place, outward, cell, progress):
     normal /= np.maximum(lengths(normal), _SLIVER * cell**2)
     held = sum(corners) / 3 - _SHIFT * cell * normal
     progress(0.0)
-    tree = KDTree(held.T, balanced_tree=False, compact_nodes=False)
+    tree = quick_tree(held.T)
 
     def look(part):
         at, way = place[part].T, outward[part].T
-        face = tree.query((at + _SHIFT * cell * way).T, k=range(1, 1 + min(_NEAREST, tree.n)))[1].T
+        face = k_nearest(tree, (at + _SHIFT * cell * way).T, _NEAREST)[1].T
         other = normal.take(face, axis=1)
         along = dots(other, way[:, None])
         a, b, c = (corner.take(face, axis=1) - at[:, None] for corner in corners)

@@ -19,6 +19,7 @@ from ...lookup import edge_keys, rows_of
 from ...parallel import over_rows
 from ...parts import near_parts
 from ...progress import Progress
+from ...trees import k_nearest
 from ..signs.sides import regions_beside
 
 _TIMES = 4  # that leaks are looked for: some show when others are shut
@@ -195,8 +196,7 @@ class _Field:
             return ends
         middle = _middle(ends, self.grid)
         sample = np.flatnonzero(grown.both)
-        tree, k = KDTree(self.surface.points[sample]), range(1, 1 + min(_AROUND, len(sample)))
-        around = sample[tree.query(middle, k=k, workers=-1)[1]]
+        around = sample[k_nearest(KDTree(self.surface.points[sample]), middle, _AROUND, workers=-1)[1]]
         radius = at_nodes(self.values, ends).max(axis=0) / np.median(self.surface.spacing[around], axis=1)
         place = near_parts(middle, ADJACENT * self.grid.spacing)
         widest = np.zeros(place.max() + 1)

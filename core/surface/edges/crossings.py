@@ -24,6 +24,7 @@ from ...linalg import COMPONENTS, dots, principal_axes, row_dots
 from ...lookup import least_of_each, numbered
 from ...parallel import even_chunks, in_order, work_through
 from ...progress import Progress
+from ...trees import k_nearest
 from .first_steps import first_steps
 from .meeting_edges import meeting_edges
 from .meetings import Meetings, find_meetings
@@ -200,7 +201,7 @@ def _normals_at_feet(foot, sample, surface, off):
     row = np.flatnonzero(_level(normals))
     height = row_dots(foot[row] - surface.points[sample[row]], normals[row])
     row = row[np.abs(height) > off]
-    around = surface.tree.query(foot[row], k=range(1, 1 + min(_AROUND, surface.tree.n)))[1]
+    around = k_nearest(surface.tree, foot[row], _AROUND)[1]
     height = row_dots(foot[row, None] - surface.points[around], surface.normals[around])
     normals[row] = surface.normals[around[np.arange(len(row)), np.abs(height).argmin(axis=1)]]
     return normals

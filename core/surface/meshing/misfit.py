@@ -5,6 +5,7 @@ from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import dots, lengths, unit_columns
+from ...trees import k_nearest, quick_tree
 from ..mesh import Mesh, at_corners, face_normals
 
 _TORN = 0.07  # cells, mean distance of the samples to a mesh, above which it is torn
@@ -50,8 +51,7 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     centre, normal = corners.mean(axis=0), unit_columns(face_normals(*corners))
     radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
     points = points[:: max(len(points) // _ASKED, 1)]
-    tree = KDTree(centre.T, balanced_tree=False, compact_nodes=False)
-    row = tree.query(points, k=range(1, 1 + min(_FACES, len(mesh.faces))), workers=-1)[1]
+    row = k_nearest(quick_tree(centre.T), points, _FACES, workers=-1)[1]
     off = points.T[:, :, None] - centre[:, row]
     height = dots(off, normal[:, row])
     lateral = np.sqrt(np.maximum(dots(off, off) - height**2, 0)) - radius[row]

@@ -2,11 +2,11 @@
 
 import numpy as np
 from scipy.sparse import coo_matrix
-from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import dots, lengths, unit_columns
 from ...parts import connected_parts
+from ...trees import quick_tree
 from ..mesh import Mesh, at_corners, face_normals
 
 _FOLD = -0.5  # cosine between the normals of two faces, below which there is a fold between them
@@ -72,7 +72,7 @@ def _distance(points, vertices, faces):
     corners = vertices[faces]
     places = [corners[:, 0], corners.mean(axis=1), *(0.5 * (corners[:, k] + corners[:, k - 1]) for k in range(3))]
     places = np.concatenate([vertices[np.unique(faces)], *places[1:]])
-    return KDTree(places, balanced_tree=False, compact_nodes=False).query(points)[0]  # quick to make, for a few queries
+    return quick_tree(places).query(points)[0]
 
 
 def _beside_folds(mesh):

@@ -29,6 +29,7 @@ from ...lookup import is_among, numbered
 from ...parallel import over_rows
 from ...parts import extents, near_parts
 from ...progress import Progress
+from ...trees import k_nearest
 from ..edges.crossings import Crossings
 from .spreading import spread_strongest
 
@@ -140,7 +141,7 @@ def _in_wedges(surface, sample, x):
 
 
 def _in_wedge(surface, sample, x):
-    near = surface.tree.query(x, k=range(1, min(_NEAR_FOLD, surface.tree.n) + 1))[1]
+    near = k_nearest(surface.tree, x, _NEAR_FOLD)[1]
     own, theirs = surface.normals[sample, None], surface.normals[near]
     step = surface.points[near] - surface.points[sample, None]
     towards, back = np.sign(row_dots(step, own)), np.sign(-row_dots(step, theirs))

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, row_dots, unit
 from ...lookup import edge_keys, numbered, rows_of, sums_of_each
 from ...parts import connected_parts
+from ...trees import k_nearest, quick_tree
 from ..mesh import Mesh, at_corners, face_normals
 from ..meshing.fillings import fillings
 
@@ -135,8 +135,7 @@ def _covered(mesh, triangle, loop, loops, cell):
         return np.zeros(loops)
     middle = mesh.vertices[triangle[large]].mean(axis=1)
     a, b, c = at_corners(mesh.vertices, mesh.faces)
-    tree = KDTree(((a + b + c) / 3).T, balanced_tree=False, compact_nodes=False)  # quick to make, for a few queries
-    row = tree.query(middle, range(1, 1 + min(_AROUND, len(mesh.faces))), workers=-1)[1]
+    row = k_nearest(quick_tree(((a + b + c) / 3).T), middle, _AROUND, workers=-1)[1]
     a, b, c = (corner[:, row] - middle.T[:, :, None] for corner in (a, b, c))
     normal = face_normals(a, b, c)
     size = np.maximum(np.sqrt(dots(normal, normal)), _TINY)
