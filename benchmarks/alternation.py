@@ -112,9 +112,8 @@ def alternate(points, settings: Settings = Settings(), progress=None):
     """
     progress = Progress.of(progress)
     given, changes = points, []
-    normals = _axes(points, settings, progress.part(0.0, 1 / (MAX_ROUNDS + 1)))
-    for turn in range(1, MAX_ROUNDS + 1):
-        part = progress.part(turn / (MAX_ROUNDS + 1), (turn + 1) / (MAX_ROUNDS + 1))
+    normals = _axes(points, settings, progress.part(0.0, 0.1))
+    for _, part in progress.part(0.1, 1.0).turns(range(MAX_ROUNDS)):
         points = points + best_moves(points, normals, given, settings.seed, part.part(0.0, 0.5))
         before, normals = normals, _axes(points, settings, part.part(0.5, 1.0))
         changes.append(largest_changes(before, normals))

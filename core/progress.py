@@ -1,6 +1,6 @@
 """Progress reports that double as the place where a run can be cancelled."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
@@ -68,6 +68,11 @@ class Progress:
         for number, item in enumerate(items):
             self(number / len(items))
             yield item
+
+    def turns(self, items: Collection) -> Iterator[tuple[Any, "Progress"]]:
+        """The items in order, and the part of the progress that each takes."""
+        for number, item in enumerate(items):
+            yield item, self.part(number / len(items), (number + 1) / len(items))
 
     def __call__(self, fraction: float) -> None:
         """Report; raises :class:`Cancelled` where the callback says so."""

@@ -82,8 +82,7 @@ def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame 
         return points, None
     progress, steps, placed = Progress.of(progress), frame.seen(points[row]), points.copy()
     moved, every = steps.copy(), np.arange(len(row))
-    for turn, k in enumerate(_NEIGHBOURS):
-        part = progress.part(turn / len(_NEIGHBOURS), (turn + 1) / len(_NEIGHBOURS))
+    for k, part in progress.turns(_NEIGHBOURS):
         moved += fit_quadrics(moved, every, k, part).step
     moved = steps + shortened(moved - steps, _LONGEST)
     disparity = moved[:, frame.axis]

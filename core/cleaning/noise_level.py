@@ -59,10 +59,9 @@ def estimate_noise(points, seed: int = 0, progress=None, noisy=None, least: floa
     fits = nested_quadrics(points, anchors, sizes, progress.part(0.0, 0.6))
     seen = [errors for _, errors in in_order(partial(_regional_errors, region=region), fits)]
     level, best, drowned = _of_least_risk(seen, counted, least)
-    for i, k in enumerate(_WIDER):
+    for k, part in progress.part(0.6, 0.9).turns(_WIDER):
         if (best == len(seen) - 1).mean() < _ASKED or k > (_MOST if drowned else _PART) * len(points):
             break
-        part = progress.part(0.6 + 0.3 * i / len(_WIDER), 0.6 + 0.3 * (i + 1) / len(_WIDER))
         seen.append(_regional_errors(fit_quadrics(points, anchors, k, part, clusters), region))
         sizes.append(k)
         level, best, drowned = _of_least_risk(seen, counted, least)

@@ -70,9 +70,7 @@ def _rounded(neighbours, n):
 
 def _onto_quadrics(points, noisy, neighbours, progress):
     moved, clusters = points.copy(), Clusters(points)
-    sizes = np.unique(neighbours[noisy])
-    for i, k in enumerate(sizes):
+    for k, part in progress.turns(np.unique(neighbours[noisy])):
         rows = np.flatnonzero(noisy & (neighbours == k))
-        part = progress.part(i / len(sizes), (i + 1) / len(sizes))
         moved[rows] += fit_quadrics(points, rows, int(k), part, clusters).step
     return moved

@@ -73,8 +73,7 @@ def _feet_of_blocks(grid, node, number, feet, progress):
     progress(0.0)
     row = own[tuple(distance_transform_edt(own < 0, return_distances=False, return_indices=True))]
     beside, held = _beside(grid, node, number), _Held.beyond_all(blocks.shape)
-    for turn in range(_ROUNDS):
-        part = progress.part(0.4 + 0.6 * turn / _ROUNDS, 0.4 + 0.6 * (turn + 1) / _ROUNDS)
+    for _, part in progress.part(0.4, 1.0).turns(range(_ROUNDS)):
         climb = partial(_climb, blocks, feet, beside, row)
         work_through(climb, part.part(0.0, 0.6).each(_slabs(blocks, _PIECE)))
         held.compare(blocks, feet, row, part.part(0.6, 1.0))

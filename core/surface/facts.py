@@ -24,11 +24,10 @@ _FACTS = (  # what takes longest first, as they are found side by side
 
 def mesh_facts(surfaces: Surfaces, progress=None) -> dict[str, dict]:
     """What the report tells of each mesh, by kind."""
-    facts, progress, kinds = {}, Progress.of(progress), len(surfaces.meshes)
-    for number, (kind, mesh) in enumerate(surfaces.meshes.items()):
+    facts = {}
+    for (kind, mesh), part in Progress.of(progress).turns(surfaces.meshes.items()):
         facts[kind] = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
         facts[kind] |= {"pieces_dropped": surfaces.dropped[kind]}
-        asked = progress.part(number / kinds, (number + 1) / kinds).each(_FACTS)
-        for _, found in in_order(lambda fact, mesh=mesh: fact(mesh), asked):
+        for _, found in in_order(lambda fact, mesh=mesh: fact(mesh), part.each(_FACTS)):
             facts[kind] |= found
     return facts

@@ -81,6 +81,14 @@ def test_chunks_can_be_cancelled():
         list(chunks)
 
 
+def test_turns_take_parts_one_after_another():
+    seen, callback = recorder()
+    for item, part in Progress(callback).part(0.5, 1.0).turns(("a", "b")):
+        for fraction in (0.0, 0.5):
+            part.part(0.0, 1.0, item)(fraction)
+    assert seen == [(0.5, "a"), (0.625, "a"), (0.75, "b"), (0.875, "b")]
+
+
 class TestWatched:
     def test_the_callback_hears_everything_in_the_callers_thread(self):
         heard = []

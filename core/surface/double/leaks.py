@@ -62,11 +62,12 @@ def shut_leaks(near, values, surface: LocalSurface, grid: Grid, level: float, pr
     levels = [level + raised * grid.spacing for raised in _RAISED]
     levels = [*(raised for raised in levels if raised < widest), widest]
     cut = near.max() if isinstance(near, np.ndarray) else near.outer.max()
-    for turn in progress.each(range(_TIMES)):
+    for _, part in progress.turns(range(_TIMES)):
+        part(0.0)
         if apart(_Field(near, surface, grid).regions(level)):
             break
         field = _Field(each(lambda u, v: np.where(u < cut, u, v), near, values), surface, grid)
-        start = field.first(progress.part(turn / _TIMES, (turn + 1) / _TIMES).each(levels), apart)
+        start = field.first(part.each(levels), apart)
         ends = field.meetings(field.grown(start, level), start.level)
         if not ends.size:
             break

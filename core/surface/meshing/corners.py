@@ -86,9 +86,9 @@ def _laid_again(place, side, step, corner, other, surface, cell, progress):
     """The same steps (v,3) by planes at the feet of places part of the way there and a little off the sheet, while
     these are on the same sheet."""
     at, normal, further, share = place, side, step, np.full((len(place), 1), _ADVANCE)
-    for turn in range(_ADVANCES):
+    for _, part in progress.turns(range(_ADVANCES)):
         x = at + share * (place + further - at) + _LIFT * cell * normal
-        near = surface.project(x, progress.part(turn / _ADVANCES, (turn + 1) / _ADVANCES))
+        near = surface.project(x, part)
         fresh = near.direction
         same = ((row_dots(fresh, normal) > _SAME) & ~near.past_rim)[:, None]
         at, normal, share = np.where(same, x - near.step, at), np.where(same, fresh, normal), share * (1 - 0.5 * ~same)

@@ -29,10 +29,9 @@ def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: floa
 
     passing : (n,) bool, the samples close to such lines
     """
-    turns = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
+    ways = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
     farthest = _farthest(mesh.vertices, passing, surface)
-    for turn, outward in enumerate(turns):
-        part = progress.part(turn / len(turns), (turn + 1) / len(turns))
+    for outward, part in progress.turns(ways):
         vertices, (normal, least) = mesh.vertices, mesh.normals
         row, side = np.flatnonzero(mesh.vertices_of(mesh.faces_at(least < FLAT))), np.zeros_like(vertices)
         way = outward * normal[row]

@@ -208,9 +208,8 @@ def _orientations(links, progress):
     size = np.bincount(part)
     shift = _SHIFT * np.median(degree[degree > 0]) if links.nnz else 1.0
     scale = degree + shift
-    for number in range(_ITERATIONS):
-        steps = progress.part(number / _ITERATIONS, (number + 1) / _ITERATIONS).each(range(_STEPS))
-        before = facing > 0
+    for _, turn in progress.turns(range(_ITERATIONS)):
+        before, steps = facing > 0, turn.each(range(_STEPS))
         facing = conjugate_gradients(
             lambda x: scale * x - links @ x, shift * facing, facing, lambda x: x / scale, _TOLERANCE, steps
         )
