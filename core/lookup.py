@@ -23,6 +23,13 @@ def numbered(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return distinct, number.reshape(keys.shape)
 
 
+def grouped(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rows of some numbers (n,) from 0 on, those of equal ones together and in order, and where among them each
+    group begins."""
+    order = np.argsort(number, kind="stable")
+    return order, np.flatnonzero(np.diff(number[order], prepend=-1))
+
+
 def least_of_each(keys: np.ndarray, *costs: np.ndarray) -> np.ndarray:
     """Of each distinct one of some keys (n,) from 0 on, ascending, the row where the costs (n,) are least, the first
     cost before the next ones; the first row of equals."""

@@ -5,6 +5,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from .lookup import grouped
+
 
 def connected_parts(one: np.ndarray, other: np.ndarray, n: int) -> np.ndarray:
     """The number of the part that each of n items is in, (n,) int32, counted from 0 on as they come: the parts that
@@ -22,7 +24,6 @@ def near_parts(places: np.ndarray, reach: float) -> np.ndarray:
 
 def extents(part: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Diagonals of the boxes around the places (m,3) of each part, which have its number, (m,); one for each part."""
-    order = np.argsort(part, kind="stable")
-    first = np.flatnonzero(np.diff(part[order], prepend=-1))
+    order, first = grouped(part)
     extent = np.maximum.reduceat(places[order], first) - np.minimum.reduceat(places[order], first)
     return np.linalg.norm(extent, axis=1)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.lookup import edge_keys, is_among, least_of_each, numbered, rows_of, sums_of_each
+from core.lookup import edge_keys, grouped, is_among, least_of_each, numbered, rows_of, sums_of_each
 
 NUMBERS = arrays(np.int64, st.integers(0, 30), elements=st.integers(-5, 20))
 
@@ -32,6 +32,13 @@ def test_distinct_numbers_in_order_and_which_each_is(keys):
     distinct, number = numbered(keys)
     assert distinct.tolist() == sorted(set(keys.tolist()))
     assert distinct[number].tolist() == keys.tolist()
+
+
+@given(st.lists(st.integers(0, 5), max_size=30))
+def test_rows_of_equal_numbers_are_grouped_in_order(numbers):
+    order, first = grouped(np.array(numbers, np.int64))
+    groups = [group.tolist() for group in np.split(order, first[1:])] if numbers else []
+    assert groups == [[row for row, each in enumerate(numbers) if each == one] for one in sorted(set(numbers))]
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 2), st.integers(-2, 2)), max_size=30))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...field.steps import NearBand
-from ...lookup import numbered
+from ...lookup import grouped, numbered
 from ...parts import connected_parts
 
 _ROUNDS = 3
@@ -104,6 +104,6 @@ def _short_loops(band, odd):
     row, across = np.divmod(odd, 3)
     cell, at = numbered(np.stack([row, band.behind[across, row]]))
     part = connected_parts(*at, len(cell))[at[0]]
-    order = np.argsort(part, kind="stable")
-    loops = np.split(odd[order], np.flatnonzero(np.diff(part[order])) + 1)
+    order, first = grouped(part)
+    loops = np.split(odd[order], first[1:])
     return [loop for loop in loops if 0 < len(loop) <= _LONGEST]

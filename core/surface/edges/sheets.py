@@ -12,6 +12,7 @@ import numpy as np
 from ...field.local_surface import LocalSurface
 from ...field.projection import CHUNK, MEMBER, TRUSTED, seen_from, sheet_foot
 from ...linalg import row_dots
+from ...lookup import grouped
 from ...parallel import even_chunks, in_order
 from ...progress import Progress
 from ...records import joined, picked
@@ -116,11 +117,10 @@ def _on_sheet(node, x, near, anchor):
 
 def _distinct(sheets, surface, cell):
     """By node, of one node in their order, without what says of it the same as a pair before."""
-    order = np.argsort(sheets.node, kind="stable")
+    order, first = grouped(sheets.node)
     axis, foot = sheets.axis[order], sheets.foot[order]
     spacing = surface.spacing[sheets.sample[order, sheets.anchor[order]]]
     kept = np.ones(len(order), bool)
-    first = np.flatnonzero(np.diff(sheets.node[order], prepend=-1))
     rest = np.diff(first, append=len(order))
     while len(first):
         first, rest = first + 1, rest - 1

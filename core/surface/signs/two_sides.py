@@ -25,7 +25,7 @@ from ...field.grid import ADJACENT, Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import conjugate_gradients, row_dots, symmetric
-from ...lookup import is_among, numbered
+from ...lookup import grouped, is_among, numbered
 from ...parallel import over_rows
 from ...parts import extents, near_parts
 from ...progress import Progress
@@ -234,8 +234,7 @@ def _agree(votes, side, band, grid, progress):
     if length.max() > LONG * max(grid.shape):
         return False
 
-    order = np.argsort(patch, kind="stable")
-    first = np.flatnonzero(np.diff(patch[order], prepend=-1))
+    order, first = grouped(patch)
     graph = abs(votes.matrix(len(side)))
     part = connected_components(graph, directed=False)[1]
     crossed = np.bincount(part[votes.low], votes.sign < 0)[part[low[order[first]]]]

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
+from ...lookup import grouped
 from ...parts import connected_parts, extents
 from ..mesh import Mesh
 
@@ -58,8 +59,7 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
     corners = mesh.vertices[mesh.faces[face]]
     rim = counts[edge[face]] != 2
     open_patch = np.bincount(label, (counts[edge[face]] == 1).any(axis=1)) > 0
-    order = np.argsort(label, kind="stable")
-    first = np.flatnonzero(np.diff(label[order], prepend=-1))
+    order, first = grouped(label)
     parts = np.split(order, first[1:])
     off = surface.project(corners.mean(axis=1)).distance
     size = extents(np.repeat(label, 3), corners.reshape(-1, 3))
