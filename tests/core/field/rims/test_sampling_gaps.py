@@ -85,6 +85,18 @@ def test_a_slit_is_not_bridged_from_samples_that_happen_to_be_far_from_their_nei
     assert (kept.bridged != rims.bridged)[~beside].mean() < 1e-3
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_patches_do_not_cover_the_middle_of_a_slit_a_little_wider_than_the_bridging_length(seed):
+    """They did along a third of it, where samples beside it were far from their neighbours."""
+    random = np.random.default_rng(seed)
+    points = np.pad(random.uniform(-1, 1, (8000, 2)), ((0, 0), (0, 1)))
+    points[:, 0] += np.sign(points[:, 0]) * 2 * np.median(local_spacing(points))
+    spacing = local_spacing(points)
+    surface = fit_local_surface(points, np.broadcast_to(UP, points.shape), np.ones(8000), spacing, 3.0)
+    middle = np.linspace(-0.9, 0.9, 400)[:, None] * [0, 1, 0]
+    assert (surface.project(middle).distance < 0.3 * np.median(spacing)).mean() < 0.02
+
+
 def test_gaps_in_the_sampling_of_a_closed_surface_stay_bridged():
     points = shapes.scattered_sphere(20_000)
     kept, rims, _ = with_and_without_openings_kept(points, points)
