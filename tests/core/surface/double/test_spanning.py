@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from core import Settings, reconstruct
 from core.field.local_surface import fit_local_surface
 from core.points import local_spacing
 from core.surface.double.spanning import spanned, spanning_vertices, stretched_vertices
@@ -66,3 +67,11 @@ def test_vertices_drawn_out_to_another_sheet_are_found_and_long_faces_on_a_sheet
     around = middle + np.array([-SIDE, -1, 0, 1, SIDE])
     np.testing.assert_array_equal(np.flatnonzero(stretched_vertices(vertices, QUADS, surface, 0.1)), around)
     assert not stretched_vertices(sheet, QUADS, surface, 0.1).any()
+
+
+def test_covers_of_few_samples_are_drawn_out_less_from_sheet_to_sheet():
+    """Of sixty samples of a torus edges were up to 15 cells long."""
+    result = reconstruct(shapes.torus(60), Settings(resolution=64, denoise=0))
+    mesh = result.surface
+    length = np.linalg.norm(mesh.vertices[mesh.edges.low] - mesh.vertices[mesh.edges.high], axis=1)
+    assert length.max() < 10 * result.field.spacing
