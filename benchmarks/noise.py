@@ -4,10 +4,7 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
-
-import numpy as np
 
 from core.cleaning.positions import LONGEST_MOVE
 from core.io.atomic import atomic_path, writable_folder
@@ -19,12 +16,14 @@ from .alternation import MAX_ROUNDS, SETTLED
 from .cases import SAMPLINGS, SPOILED, Case, find_cases, has_sampling, load_case
 from .noise_hostile import RESOLUTION, fuzzed, tried
 from .noise_measure import (
+    CASES,
     FAINT,
     HALF_NOISE,
     MORE,
     NOISE,
     NOISE_OF_MORE,
     PCA_NEIGHBOURS,
+    SHAPE,
     SHIFTS,
     SLIGHT,
     STRAYS,
@@ -44,16 +43,12 @@ from .noise_plots import picture, plot_noise
 from .noise_silence import NOISE as SILENCE_NOISE
 from .noise_silence import POINTS as SILENCE_POINTS
 from .noise_silence import RUNS, STOPS, silences, sphere, stops
+from .noise_verdicts import verdicts
 from .peers import check_open3d
 from .starts import JET_NEIGHBOURS
-from .status import DOCS, DONE, exit_status, said, word
+from .status import DOCS, DONE, exit_status, said
 from .versions import listed, versions
 
-CASES = ["spot_10k", "cloth_10k", "moebius_5k"]
-SHAPE = CASES[0]
-TARGET_STRAYS, TARGET_SILENCE = 1.2, 1.0
-FOUND = 0.9  # of the points of a noisy part, that are moved at least
-TARGETS = {0.5: {"factor": 3.3, "nc": 0.985, "cd": 0.90}, 1.0: {"nc": 0.97, "cd": 1.7}}  # for SHAPE, noise in per cent
 _LIBRARIES = "numpy", "scipy", "open3d", "cgal"
 
 _PAGE = """\
@@ -187,10 +182,11 @@ returned, with its warnings, or the one line of its refusal.
 
 {hostile}
 
-Beyond these, {fuzz_runs} combinations of clouds (spheres, grids, planes, close sheets, noise) with duplicates, NaN,
+Beyond these, {fuzz[runs]} combinations of clouds (spheres, grids, planes, close sheets, noise) with duplicates, NaN,
 far points, far copies, strays, noise and rounding, as several array types, at scales from 1e-9 to 1e9:
-{fuzz_done} done, {fuzz_refused} refused in one line, {fuzz_crashed} crashed, {fuzz_nan} with NaN, {fuzz_hung} hung;
-the longest took {fuzz_seconds:.1f} s. The tests draw more of them, and kill runs over existing output at random
+{fuzz[done]} done, {fuzz[refused]} refused in one line, {fuzz[crashed]} crashed, {fuzz[not finite]} with NaN, \
+{fuzz[hung]} hung;
+the longest took {fuzz[seconds]:.1f} s. The tests draw more of them, and kill runs over existing output at random
 moments.
 
 ## Cost, said before and taken
@@ -308,8 +304,8 @@ def write_page(measured: dict, docs: Path) -> Path:
     write_report(folder / "numbers.json", measured)
     shape = [row for row in measured["noise"] if row["case"] == SHAPE]
     plot_noise(folder / "noise.png", shape, measured["categories"][SHAPE])
-    fuzz = measured["fuzz"]
     text = _PAGE.format(
+        **{name: tables.markdown(rows) for name, rows in _tables(measured).items()},
         versions=listed(measured["versions"]),
         verdicts="\n".join(f"- {line}" for line in verdicts(measured)),
         longest=LONGEST_MOVE,
@@ -318,106 +314,45 @@ def write_page(measured: dict, docs: Path) -> Path:
         jet=JET_NEIGHBOURS,
         pca=", ".join(map(str, PCA_NEIGHBOURS)),
         shape=SHAPE,
-        distances=tables.markdown(tables.distances(measured["noise"])),
-        normals=tables.markdown(tables.normals(measured["noise"])),
-        surfaces=tables.markdown(tables.surfaces(measured["noise"])),
         alternating_cost=tables.cost(measured["noise"], "alternating"),
         poisson_cost=tables.cost(measured["noise"], "poisson"),
         half_noise=HALF_NOISE,
-        halves=tables.markdown(tables.halves(measured["halves"])),
         clean_runs=len(measured["clean"]),
         taken=tables.listed(f"{share:.1%} of {name}" for name, share in measured["clean"].items() if share),
-        strays=tables.markdown(tables.strays(measured["strays"])),
-        published=tables.markdown(tables.beside_published(measured)),
-        more=tables.markdown(tables.more(measured["more"])),
-        slight=tables.markdown(tables.by_level(measured["slight"], "noise")),
-        walls=tables.markdown(tables.by_level(measured["walls"], "thickness")),
-        shifted=tables.markdown(tables.by_level(measured["shifted"], "shift")),
-        faint=tables.markdown(tables.faint(measured["faint"])),
         wire_runs=noise_wires.RUNS,
-        wires=tables.markdown(tables.wires(measured["wires"])),
         bridge=noise_uneven.BRIDGE,
-        uneven=tables.markdown(tables.uneven(measured["uneven"])),
-        costs=tables.markdown(tables.cost_rows(measured["costs"])),
         shared=f"kept busy (load {measured['load']:.0f})" if measured["load"] else "may have kept busy",
-        stops=tables.markdown(tables.stops(measured["stops"])),
         resolution=RESOLUTION,
-        hostile=tables.markdown(tables.hostile(measured["hostile"])),
-        fuzz_runs=fuzz["runs"],
-        fuzz_done=fuzz["done"],
-        fuzz_refused=fuzz["refused"],
-        fuzz_crashed=fuzz["crashed"],
-        fuzz_nan=fuzz["not finite"],
-        fuzz_hung=fuzz["hung"],
-        fuzz_seconds=fuzz["seconds"],
+        fuzz=measured["fuzz"],
         silence_points=SILENCE_POINTS,
         silence_noise=SILENCE_NOISE,
-        silences=tables.markdown(tables.silences(measured["silences"])),
     )
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return page
 
 
-def verdicts(measured: dict) -> Iterator[str]:
-    """A line for each target: what is asked, what came out."""
-    for row in measured["noise"]:
-        if row["case"] != SHAPE or row["percent"] not in TARGETS:
-            continue
-        asked, ours = TARGETS[row["percent"]], row["ours"]
-        reached = {"factor": row["before"] / ours["after"], "nc": ours["nc"], "cd": ours["cd"]}
-        name = {"factor": "distance of the points reduced", "nc": "NC", "cd": "CD"}
-        for key, limit in asked.items():
-            met = reached[key] <= limit if key == "cd" else reached[key] >= limit
-            form, bound = ("{:.1f} times", "at least") if key == "factor" else ("{:.3f}", "at least")
-            bound = "at most" if key == "cd" else bound
-            yield (
-                f"{word(met)}: {SHAPE} at {row['percent']:g} %: {name[key]} {form.format(reached[key])} "
-                f"({bound} {limit:g} is asked)."
-            )
-    behind = [tables.place(row) for row in measured["noise"] if row["ours"]["nc"] < row["pca"]["nc"]]
-    rows = len(measured["noise"])
-    yield f"NC is below that of the best PCA on {len(behind)} of {rows} rows: {tables.listed(behind)}."
-    behind = [tables.place(row) for row in measured["noise"] if row["ours"]["after"] > row["alternating"]["after"]]
-    yield f"The paper's alternation leaves the points closer to the surface on {', '.join(behind) or 'no row'}."
-    lost = [row["case"] for row in measured["halves"] if row["found"] < FOUND]
-    yield f"{word(not lost)}: noise of {HALF_NOISE:g} % in one half is found; not on: {tables.listed(lost)}."
-    missed = [row for row in measured["faint"] if row["moved"] < FOUND]
-    lost = [f"{row['case']}, {row['part']} of {row['share']:.0%} at {row['level']:g} spacings" for row in missed]
-    asked = len(measured["faint"])
-    yield f"Of faint noise and that of small parts {len(lost)} of {asked} are missed: {tables.listed(lost)}."
-    clean = {row["case"]: row["cd"] for row in measured["strays"] if not row["share"]}
-    ratio = {row["case"]: row["cd"] / clean[row["case"]] for row in measured["strays"] if row["share"] == 0.05}
-    worst = max(ratio, key=ratio.get)
-    yield (
-        f"{word(ratio[worst] <= TARGET_STRAYS)}: with 5 % of strays the CD is at most {ratio[worst]:.2f} times that "
-        f"of the clean run, on {worst} (at most {TARGET_STRAYS:g} is asked)."
-    )
-    bad = [row["given"] for row in measured["hostile"] if row["outcome"] not in ("done", "refused")]
-    bad_fuzz = measured["fuzz"]["runs"] - measured["fuzz"]["done"] - measured["fuzz"]["refused"]
-    yield (
-        f"{word(not bad and not bad_fuzz)}: of {len(measured['hostile'])} bad inputs and {measured['fuzz']['runs']} "
-        f"combinations, {len(bad) + bad_fuzz} crashed, hung or gave NaN (none is asked)."
-    )
-    runs = measured["silences"].items()
-    cpu, stage, name = max((found["cpu"], stage, name) for name, stages in runs for stage, found in stages.items())
-    yield (
-        f"The longest work between two looks at {SILENCE_POINTS:,} points is {cpu:.2f} CPU seconds, in the stage "
-        f"{stage} of {name}."
-    )
-    late, name = max((row["stopped"], name) for name, rows in measured["stops"].items() for row in rows)
-    yield (
-        f"{word(late <= TARGET_SILENCE)}: a cancelled run of {SILENCE_POINTS:,} points is back after {late:.2f} s "
-        f"by the clock at most, {name} (at most {TARGET_SILENCE:g} s is asked)."
-    )
-    for key, found in noise_cost.ratios(measured["costs"]).items():
-        yield (
-            f"{word(np.abs(found - 1).max() <= noise_cost.WITHIN)}: the {'time' if key == 'cpu' else 'memory'} said "
-            f"before a run is {found.min():.2f} to {found.max():.2f} of what it takes, over {len(found)} runs (within "
-            f"{noise_cost.WITHIN:.0%} is asked)."
-        )
-    lost = max(run["lost"] for row in measured["wires"] for run in row["runs"] if not run["share"])
-    yield f"{word(not lost)}: of wires without strays {lost:.1%} of the points are dropped at most (none is asked)."
+def _tables(measured):
+    """Rows of the page's tables, by the names that it has for them."""
+    return {
+        "distances": tables.distances(measured["noise"]),
+        "normals": tables.normals(measured["noise"]),
+        "surfaces": tables.surfaces(measured["noise"]),
+        "halves": tables.halves(measured["halves"]),
+        "strays": tables.strays(measured["strays"]),
+        "published": tables.beside_published(measured),
+        "more": tables.more(measured["more"]),
+        "slight": tables.by_level(measured["slight"], "noise"),
+        "walls": tables.by_level(measured["walls"], "thickness"),
+        "shifted": tables.by_level(measured["shifted"], "shift"),
+        "faint": tables.faint(measured["faint"]),
+        "wires": tables.wires(measured["wires"]),
+        "uneven": tables.uneven(measured["uneven"]),
+        "costs": tables.cost_rows(measured["costs"]),
+        "stops": tables.stops(measured["stops"]),
+        "hostile": tables.hostile(measured["hostile"]),
+        "silences": tables.silences(measured["silences"]),
+    }
 
 
 if __name__ == "__main__":

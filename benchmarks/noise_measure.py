@@ -20,6 +20,8 @@ from .peers import PEERS, Clock, poisson
 from .processes import Failed, run_fresh
 from .starts import smoothed
 
+CASES = ["spot_10k", "cloth_10k", "moebius_5k"]
+SHAPE = CASES[0]
 NOISE = (0.1, 0.5, 1.0, 1.5)  # per cent of the longest side
 MORE, NOISE_OF_MORE = (10_000, 30_000, 100_000), (0.5, 1.0, 2.0)  # points; per cent of the longest side
 HALF_NOISE = 0.5

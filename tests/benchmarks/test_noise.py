@@ -15,11 +15,13 @@ from benchmarks import noise_hostile, noise_measure, published
 from benchmarks.cases import Case
 from benchmarks.geometry import face_normals, surface_samples
 from benchmarks.metrics import surface_errors
-from benchmarks.noise import CASES, SHAPE, main, verdicts, write_page
+from benchmarks.noise import main, write_page
 from benchmarks.noise_hostile import FILES, POINTS, tried
 from benchmarks.noise_measure import (
+    CASES,
     MARGIN,
     NOISE,
+    SHAPE,
     STRAYS,
     by_peer,
     half_noisy,
@@ -34,6 +36,7 @@ from benchmarks.noise_measure import (
 )
 from benchmarks.noise_silence import silences, stops
 from benchmarks.noise_uneven import mixed
+from benchmarks.noise_verdicts import verdicts
 from benchmarks.noise_wires import CLUSTERED, SHARES, WIRES
 from benchmarks.noise_wires import measure as measure_wires
 from benchmarks.shapes import closed
