@@ -22,6 +22,7 @@ from .shapes import rooms
 from .starts import FILTER, without_strays
 from .status import DOCS, DONE, exit_status, said
 from .versions import listed, versions
+from .voxels import occupied, segmented
 
 SHAPES = ("bumps_10k", "box_10k", "tangle_10k", "knot_10k", "candy_10k", "hemisphere_2k", "cloth_10k", "mask_5k")
 POINTS = 20_000
@@ -31,6 +32,15 @@ ROOM_NOISE = 0.0, 0.1, 0.3  # per cent of the longest side
 FRAME_WIDTH = 320  # pixels
 FRAMES = (1.5, 0.0), (1.5, 0.3), (4.0, 0.0), (4.0, 0.3), (8.0, 0.5)  # pixels to a step of depth; noise, steps
 FRAME_SHOWN = FRAMES[3]
+VOXELS = [
+    (kind, name, across)
+    for kind, names in (
+        ("occupied", ("bumps_10k", "tangle_10k", "cloth_10k")),
+        ("segmented", ("bumps_10k", "tangle_10k")),
+    )
+    for name in names
+    for across in (40, 80)
+]
 
 _FEET = 100_000
 _PIXELS = 480
@@ -75,6 +85,14 @@ truth, as they come and as they are moved. *to the truth*, *seen*: from the sing
 what was seen. Means. *borders*, *pieces*: of the single layer. With `denoise=0` points stay where they are.
 
 {frames}
+
+## Voxels
+
+Centres of the voxels that a surface meets (*occupied*), as of a scan that was binned, and of those inside it with
+another outside beside a face (*segmented*), as of a mask; *across*: so many along its longest side. The latter lie
+up to a voxel inside the surface, which is most of the error there. CD (HD), and how many pieces the double cover has.
+
+{voxels}
 """
 
 
@@ -103,6 +121,10 @@ def measure() -> dict:
         "images": [said(name, measure_images(name)) for name in SHAPES],
         "rooms": [said(f"room, {count:,} points, {noise:g} %", measure_room(count, noise)) for count, noise in scans],
         "frames": [said(f"frame, steps of {step:g}, {noise:g}", measure_frame(step, noise)) for step, noise in FRAMES],
+        "voxels": [
+            said(f"{name}, {kind}, {across} voxels", measure_voxels(kind, name, across))
+            for kind, name, across in VOXELS
+        ],
     }
 
 
@@ -165,6 +187,28 @@ def measure_frame(step: float, noise: float, width: int = FRAME_WIDTH) -> dict:
     return {"points": len(points), "step": step, "noise": noise, "ours": here, "as_they_come": as_they_come}
 
 
+def measure_voxels(kind: str, name: str, across: int) -> dict:
+    """What becomes of the voxels of a shape, see `docs/scans.md`. A peer that crashes is left out."""
+    truth = CASES[name].surface().mesh
+    points = occupied(truth, across, np.random.default_rng(0)) if kind == "occupied" else segmented(truth, across)
+
+    def found(settings):
+        result = reconstruct(points, settings)
+        return {**cd_and_hd(result.surface, truth), "pieces": result.report["meshes"]["double"]["pieces"]}
+
+    peer = by_peer(_poisson, points, truth)
+    ways = {
+        "ours": found(Settings()),
+        "as_they_come": found(Settings(denoise=0)),
+        **({"poisson": peer} if peer else {}),
+    }
+    return {"kind": kind, "shape": name, "across": across, "points": len(points), **ways}
+
+
+def _poisson(points, truth):
+    return cd_and_hd(poisson(points)[0], truth)
+
+
 def write_page(measured: dict, docs: Path) -> Path:
     """Write scans.md and the numbers into the folder `docs`. Returns the page."""
     write_report(writable_folder(docs / "scans") / "numbers.json", measured)
@@ -182,6 +226,7 @@ def write_page(measured: dict, docs: Path) -> Path:
         rooms=markdown(_rooms(measured["rooms"])),
         width=FRAME_WIDTH,
         frames=markdown(_frames(measured["frames"])),
+        voxels=markdown(_voxels(measured["voxels"])),
     )
     with atomic_path(page) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -212,16 +257,27 @@ def _frames(rows):
             yield f"{row['points']:,}", f"{row['step']:g}", f"{row['noise']:g}", name, *off, *counts
 
 
+def _voxels(rows):
+    yield "voxels", "shape", "across", "points", "here", "pieces", "`denoise=0`", "pieces", "Poisson"
+    for row in rows:
+        ours, as_they_come, peer = cells(row, ("ours", "as_they_come", "poisson"))
+        pieces = (str(row[way]["pieces"]) for way in ("ours", "as_they_come"))
+        told = ours, next(pieces), as_they_come, next(pieces), peer
+        yield row["kind"], row["shape"], str(row["across"]), f"{row['points']:,}", *told
+
+
 def picture(path: Path) -> Path:
-    """Points and surfaces of the tangle's depth images, of the noisiest scan of the room and of a frame of it."""
-    figure, panels = sheet(2, 4)
+    """Points and surfaces of depth images and voxels of the tangle, of the noisiest scan of the room and of a frame."""
+    figure, panels = sheet(3, 4)
     tangle = depth_images(CASES["tangle_10k"].surface().mesh, POINTS, np.random.default_rng(0))[0]
     room = seen_from_one_spot(rooms.room().mesh, ROOM_POINTS[-1], ROOM_NOISE[-1], np.random.default_rng(0))[0]
     frame = depth_frame(before_camera(rooms.room().mesh), FRAME_WIDTH, *FRAME_SHOWN, np.random.default_rng(0))[0]
+    voxels = segmented(CASES["tangle_10k"].surface().mesh, 40)
     given = (
         ("depth images of a tangle", tangle, np.asarray, View(), panels[0, :2]),
         ("a room from one spot", room, np.asarray, View((0.5, -1.0, 0.9)), panels[0, 2:]),
         ("a frame of a depth camera", frame, in_room, View((-1.0, -0.3, 0.6)), panels[1, :2]),
+        ("voxels of a tangle", voxels, np.asarray, View(), panels[2, :2]),
     )
     for name, points, place, view, (left, right) in given:
         camera = view.camera(place(points), _PIXELS)
@@ -232,6 +288,8 @@ def picture(path: Path) -> Path:
     stepped = reconstruct(frame, Settings(denoise=0)).surface
     draw_surface(panels[1, 2], replace(stepped, vertices=in_room(stepped.vertices)), camera, view)
     caption(panels[1, 2], "of its points as they come")
+    draw_surface(panels[2, 2], reconstruct(voxels, Settings(denoise=0)).surface, View().camera(voxels, _PIXELS), View())
+    caption(panels[2, 2], "of its points as they come")
     return save(figure, path)
 
 

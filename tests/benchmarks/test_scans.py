@@ -1,11 +1,13 @@
 """Scans of shapes whose visible parts are known, and the page on made-up numbers."""
 
 import json
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("igl")
@@ -19,12 +21,15 @@ from benchmarks.scans import (
     ROOM_NOISE,
     ROOM_POINTS,
     SHAPES,
+    VOXELS,
     measure_frame,
     measure_images,
     measure_room,
+    measure_voxels,
     write_page,
 )
 from benchmarks.shapes import closed, rooms
+from benchmarks.voxels import occupied, segmented
 from core import Mesh
 
 
@@ -107,6 +112,33 @@ def test_steps_of_a_frame_are_smoothed():
     assert row["ours"]["borders"] < 0.5 * row["as_they_come"]["borders"]
 
 
+def test_voxels_are_those_that_a_surface_meets_or_bounds():
+    cube, turn = closed.cube().mesh, Rotation.from_rotvec([0.4, 0.3, 0.2]).as_matrix()
+    mesh = replace(cube, vertices=cube.vertices @ turn.T)
+    side = np.ptp(mesh.vertices, axis=0).max() / 30
+    met = occupied(mesh, 30, np.random.default_rng(0))
+    away = closest_points(met, mesh)[0]
+    assert away.max() <= 0.5 * np.sqrt(3) * side
+    places = np.rint(met / side - 0.5)
+    np.testing.assert_allclose(met, side * (places + 0.5), atol=1e-9)
+    inside = segmented(mesh, 30)
+    depth = 0.4 - np.abs(inside @ turn).max(axis=1)
+    assert depth.min() > 0
+    assert depth.max() <= 1.01 * side
+    area = mesh.face_areas().sum() / side**2
+    assert 0.7 * area < len(inside) < 1.3 * area
+
+
+@pytest.mark.parametrize("kind", ["occupied", "segmented"])
+def test_voxels_are_smoothed(kind, monkeypatch):
+    monkeypatch.setattr(scans, "by_peer", lambda *_: {})
+    monkeypatch.setattr(noise_measure, "surface_errors", partial(surface_errors, count=2000))
+    row = measure_voxels(kind, "torus_5k", 24)
+    assert row["ours"]["pieces"] == 2
+    assert row["ours"]["hd"] < row["as_they_come"]["hd"]
+    assert "poisson" not in row
+
+
 def made_up():
     errors = {"cd": 0.5, "hd": 9.0}
     ways = {"ours": errors, "all": {"cd": 5.0, "hd": 90.0}, "none": errors, "poisson": {"cd": 2.5, "hd": 70.0}}
@@ -120,7 +152,11 @@ def made_up():
     frames = [
         {"points": 900, "step": s, "noise": n, "ours": way, "as_they_come": {**way, "borders": 90}} for s, n in FRAMES
     ]
-    return {"versions": {"Python": "3.11"}, "images": images, "rooms": rooms, "frames": frames}
+    errors = {"cd": 1.5, "hd": 9.0, "pieces": 2}
+    ways = {"ours": errors, "as_they_come": {**errors, "pieces": 20}}
+    voxels = [{"kind": kind, "shape": name, "across": n, "points": 4000, **ways} for kind, name, n in VOXELS]
+    voxels[0]["poisson"] = {"cd": 2.0, "hd": 8.0}
+    return {"versions": {"Python": "3.11"}, "images": images, "rooms": rooms, "frames": frames, "voxels": voxels}
 
 
 def test_page_holds_every_row(tmp_path):
@@ -131,5 +167,7 @@ def test_page_holds_every_row(tmp_path):
     assert "| 30,000 | 0.1 | 3 | 0.25 (4) | 0.50 (6) |" in page
     assert "| 900 | 4 | 0.3 | here | 0.12 | 0.50 | 0.25 | 3 | 2 |" in page
     assert "| 900 | 4 | 0.3 | `denoise=0` | 0.12 | 0.50 | 0.25 | 90 | 2 |" in page
+    assert "| occupied | bumps_10k | 40 | 4,000 | 1.500 (9) | 2 | 1.500 (9) | 20 | 2.000 (8) |" in page
+    assert "| segmented | tangle_10k | 80 | 4,000 | 1.500 (9) | 2 | 1.500 (9) | 20 | – |" in page
     assert f"{IMAGES} depth images" in page
     assert json.loads((tmp_path / "scans" / "numbers.json").read_text()) == measured
