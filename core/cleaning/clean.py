@@ -10,20 +10,25 @@ from ..settings import Settings
 from .depth_steps import between_steps
 from .outliers import find_outliers
 from .positions import denoise
+from .voxels import find_voxels
 
+_SOLID = 0.15  # of the samples of voxels, at least, are inside of solids; of those that surfaces meet, up to .03
 _FAR = 2.0  # times as long as the box around those kept is the one around all, at least, for cells to be told larger
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
-    """Samples without strays, noise and steps of depth, and what was done about them, in input units, for the report.
+    """Samples without strays, noise, steps of depth and the inside of solids of voxels, and what was done about them, in
+    input units, for the report.
 
     Clean samples come back as they are, bit for bit.
     """
     progress = Progress.of(progress)
     samples, stepped = _off_steps_of_depth(samples, settings.denoise, progress.part(0.0, 0.1))
-    dropped = np.zeros(len(samples.points), bool)
     if settings.outliers:
+        samples = _boundary_of_solid(samples, settings.seed)
         dropped = find_outliers(samples.points, progress.part(0.1, 0.3))
+    else:
+        dropped = np.zeros(len(samples.points), bool)
     if dropped.any():
         samples = samples.without(dropped, _said_of_dropped(dropped, samples.points))
     spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
@@ -44,6 +49,15 @@ def _said_of_dropped(dropped, points):
         return said
     larger = f"the grid's cells would be {every / rest:.2g} times as large with them"
     return f"{said}, some so far from the rest that {larger}; with outliers=False they stay"
+
+
+def _boundary_of_solid(samples, seed):
+    """The samples; of a solid of voxels, which is full of them, those that bound it."""
+    voxels = find_voxels(samples.points, seed) if len(samples.points) > 1 else None
+    if voxels is None or (inside := voxels.inside()).mean() < _SOLID:
+        return samples
+    said = f"{inside.sum()} of {len(inside)} points lie inside a solid of voxels: its boundary alone is taken"
+    return samples.without(inside, f"{said}; with outliers=False they stay")
 
 
 def _said_of_voxels(side):

@@ -32,7 +32,7 @@ def looks_noisy(points, spacing) -> bool:
     less sure than :func:`noisy_samples`, which asks the normals as well."""
     if len(points) < MINIMUM_SAMPLES:
         return False
-    found, voxels = roughness(points, spacing, 0, Progress()), find_voxels(points, spacing)
+    found, voxels = roughness(points, spacing, 0, Progress()), find_voxels(points)
     return found.whole or (voxels is not None and _around_stairs(found, voxels).any())
 
 

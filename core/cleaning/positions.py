@@ -39,7 +39,7 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     strength = Settings(denoise=strength).denoise
     if len(points) <= LADDER[0] or strength == 0:
         return given, {}
-    voxels = find_voxels(points, spacing, seed)
+    voxels = find_voxels(points, seed)
     if strength == "auto":
         noisy, strength = noisy_samples(points, spacing, seed, progress.part(0.0, 0.1), voxels), 1.0
     else:

@@ -11,6 +11,7 @@ from itertools import combinations, product
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..points import SPACING_NEIGHBOURS
 from .anchors import some_samples
 
 _LOOKED_AT, _NEAREST = 300, 8  # samples, and the nearest to each, whose offsets are looked at
@@ -19,6 +20,7 @@ _WHOLE = 0.02  # steps, that an offset is off whole numbers of them, at most
 _MOST = 0.9  # of the offsets, at least, are no further off; strays have others
 _TWINS, _ALIKE = 5, 1e-3  # as many others are like an offset that spans the lattice, to so much of a typical length
 _COARSE = 0.25  # local spacings, the side at least
+_STEPS = np.eye(3, dtype=int)  # over the faces of a voxel
 _NUMBERED = np.array([1, 1 << 21, 1 << 42])  # times places: one number for each, two million on a side
 _ROUNDED = 1 / np.sqrt(12)  # standard deviation of errors that are uniform over a step
 
@@ -50,21 +52,31 @@ class Voxels:
         """Which of the samples `rows` (m,) have another beside an edge of their voxel, but none beside the faces that
         this edge is between, (m,) bool: where terraces end that a surface between the voxels leaves. Boxes, and
         surfaces that go through voxels, have hardly any."""
-        taken, own = np.sort(self.place @ _NUMBERED), self.place[rows]
-
-        def holds(step):
-            asked = (own + step) @ _NUMBERED
-            return taken[np.minimum(np.searchsorted(taken, asked), len(taken) - 1)] == asked
-
-        found = np.zeros(len(rows), bool)
-        for one, other in combinations(np.eye(3, dtype=int), 2):
+        own, found = self.place[rows], np.zeros(len(rows), bool)
+        for one, other in combinations(_STEPS, 2):
             for a, b in product((-one, one), (-other, other)):
-                found |= holds(a + b) & ~holds(a) & ~holds(b)
+                found |= self._taken(own + a + b) & ~self._taken(own + a) & ~self._taken(own + b)
         return found
 
+    def inside(self) -> np.ndarray:
+        """Which samples have others beside all six faces of their voxel, (n,) bool."""
+        found = np.ones(len(self.place), bool)
+        for step in (*_STEPS, *-_STEPS):
+            found[found] = self._taken(self.place[found] + step)
+        return found
 
-def find_voxels(points, spacing, seed: int = 0) -> Voxels | None:
-    """The voxels that samples (n,3) with local spacing (n,) are of; None where they are of none.
+    def _taken(self, place):
+        """Which of some places (m,3) samples have, (m,) bool."""
+        asked = place @ _NUMBERED
+        return self._numbers[np.minimum(np.searchsorted(self._numbers, asked), len(self._numbers) - 1)] == asked
+
+    @cached_property
+    def _numbers(self):
+        return np.sort(self.place @ _NUMBERED)
+
+
+def find_voxels(points, seed: int = 0) -> Voxels | None:
+    """The voxels that samples (n,3), n > 1, are of; None where they are of none.
 
     The three shortest offsets between neighbours that are independent, and recur, span the lattice that these lie on,
     if they lie on any; then the others are whole numbers of them.
@@ -84,6 +96,7 @@ def find_voxels(points, spacing, seed: int = 0) -> Voxels | None:
     on = np.abs(steps - whole).max(axis=1) < _WHOLE
     if on.mean() < _MOST:
         return None
+    spacing = length.reshape(len(rows), -1)[:, :SPACING_NEIGHBOURS].mean(axis=1)
     edges = np.linalg.lstsq(whole[on], offset[on], rcond=None)[0]
     found = Voxels(edges, np.rint((points - points[0]) @ np.linalg.inv(edges)).astype(np.int64))
     return found if found.side >= _COARSE * np.median(spacing) else None

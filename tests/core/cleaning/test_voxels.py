@@ -50,22 +50,18 @@ VOXELS = {
 }
 
 
-def voxels_of(points):
-    return find_voxels(points, local_spacing(points))
-
-
 @pytest.mark.parametrize("name", VOXELS)
 def test_the_side_is_found_in_any_turn(name):
     points, side = VOXELS[name]
     for turn in (np.eye(3), shapes.random_rotation(1)):
-        assert voxels_of((points + 5.0) @ turn.T).side == pytest.approx(side, rel=1e-9)
-        assert voxels_of((points @ turn.T).astype(np.float32).astype(float)).side == pytest.approx(side, rel=1e-4)
+        assert find_voxels((points + 5.0) @ turn.T).side == pytest.approx(side, rel=1e-9)
+        assert find_voxels((points @ turn.T).astype(np.float32).astype(float)).side == pytest.approx(side, rel=1e-4)
 
 
 def test_strays_among_them_do_not_matter(random):
     points, side = VOXELS["torus"]
     strays = random.uniform(-1.4, 1.4, size=(len(points) // 50, 3))
-    assert voxels_of(np.vstack([strays, points])).side == pytest.approx(side, rel=1e-6)
+    assert find_voxels(np.vstack([strays, points])).side == pytest.approx(side, rel=1e-6)
 
 
 def around_prism(corners):
@@ -88,15 +84,15 @@ def around_prism(corners):
     ids=["random", "spiral", "prism", "rounded finely", "fine heights", "flat grid"],
 )
 def test_others_are_none(points):
-    assert voxels_of(points) is None
+    assert find_voxels(points) is None
 
 
 def test_stairs_are_where_terraces_end():
     ball, box = VOXELS["ball"][0], VOXELS["box"][0]
-    assert voxels_of(ball).stairs(np.arange(len(ball))).mean() > 0.6
-    assert not voxels_of(box).stairs(np.arange(len(box))).any()
+    assert find_voxels(ball).stairs(np.arange(len(ball))).mean() > 0.6
+    assert not find_voxels(box).stairs(np.arange(len(box))).any()
     stair = np.array([[x, y, z] for x, z in ((0, 0), (1, 0), (2, 0), (3, 1), (4, 1), (5, 1)) for y in range(20)], float)
-    found = voxels_of(stair).stairs(np.arange(len(stair)))
+    found = find_voxels(stair).stairs(np.arange(len(stair)))
     np.testing.assert_array_equal(np.unique(stair[found, 0]), [2, 3])
 
 
@@ -106,7 +102,7 @@ def test_voxels_of_curved_surfaces_are_noisy(name, share):
     points = VOXELS[name][0] @ shapes.random_rotation(2).T
     spacing = local_spacing(points)
     assert looks_noisy(points, spacing)
-    assert noisy_samples(points, spacing, voxels=find_voxels(points, spacing)).mean() >= share
+    assert noisy_samples(points, spacing, voxels=find_voxels(points)).mean() >= share
 
 
 def test_a_box_of_voxels_stays():
@@ -154,7 +150,7 @@ def test_heights_are_taken_off_their_steps(step, steep):
 
 def test_the_level_is_no_less_than_is_known():
     points, side = VOXELS["ball"]
-    known = voxels_of(points).noise
+    known = find_voxels(points).noise
     assert known == pytest.approx(side / np.sqrt(12))
     free, held = (estimate_noise(points, least=least) for least in (0.0, known))
     assert (held.level >= known).all()
@@ -169,6 +165,27 @@ def test_steps_are_told_in_input_units():
     assert any("points are in steps of 60, as voxels" in warning for warning in cleaned.warnings)
     as_given = prepare_samples(points)
     assert clean(as_given, Settings(denoise=0))[0] is as_given
+
+
+def filled_ball(side):
+    steps = np.arange(-1.2, 1.2, side)
+    x = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1)
+    return x[ball(x)]
+
+
+def test_a_solid_of_voxels_is_its_boundary():
+    solid, turn = filled_ball(0.06), shapes.random_rotation(4).T
+    cleaned, _ = clean(prepare_samples(solid @ turn))
+    assert len(cleaned.points) == len(VOXELS["ball"][0])
+    kept = solid[cleaned.source_index]
+    np.testing.assert_array_equal(np.unique(kept, axis=0), np.unique(VOXELS["ball"][0], axis=0))
+    assert any(f"{len(solid) - len(kept)} of {len(solid)} points lie inside" in told for told in cleaned.warnings)
+    assert len(clean(prepare_samples(solid), Settings(outliers=False))[0].points) == len(solid)
+
+
+@pytest.mark.parametrize("name", VOXELS)
+def test_boundaries_of_voxels_are_no_solids(name):
+    assert find_voxels(VOXELS[name][0]).inside().mean() < 0.05
 
 
 @pytest.mark.parametrize("name", ["ball", "torus"])
