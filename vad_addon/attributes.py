@@ -65,11 +65,13 @@ def read(data) -> dict[str, Attribute]:
 
 
 def left_out(data) -> list[str]:
-    """Names of what :func:`read` leaves out, be it for its kind or as it is of faces or edges of a mesh."""
+    """Names of what :func:`read` leaves out, for its kind or as it is of faces or edges of a mesh; no UV maps, which
+    suit no other faces."""
     return [
         attribute.name
         for attribute in _own(data)
         if not _is_of_corners(attribute)
+        and (attribute.domain, attribute.data_type) != ("CORNER", "FLOAT2")
         and (attribute.data_type not in _LAYOUT or attribute.domain in {"FACE", "EDGE", "CORNER"})
         and not (attribute.domain != "POINT" and attribute.name in _BLENDERS)
     ]

@@ -17,7 +17,7 @@ _FAR = 2.0  # times as long as the box around those kept is the one around all, 
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
-    """Samples without strays, noise, steps of depth and the inside of solids of voxels, and what was done about them, in
+    """Samples without strays, noise, steps of depth and insides of solids of voxels, and what was done about them, in
     input units, for the report.
 
     Clean samples come back as they are, bit for bit.

@@ -92,7 +92,7 @@ def test_colours_of_corners_reach_the_surface_and_what_does_not_is_told(blender,
     shown = values(surface.data, "Painted", "color", 4)[:, :3]
     assert np.abs(shown - (0.5 + 0.5 * (positions(surface.data) + np.array(surface.location)))).max() < 0.15
     (told,) = extension("vad_addon.results").warnings(blender.context.scene.vad.result)
-    assert told.startswith("Not carried over: UVMap, Weights, note, part; only numbers and colors of points")
+    assert told.startswith("Not carried over: Weights, note, part; only numbers and colors of points")
 
 
 def test_colours_and_intensity_of_a_scanners_file_reach_the_surface(blender, folder, sphere):
