@@ -105,5 +105,5 @@ def test_without_openvdb_the_message_names_the_ways_out(monkeypatch):
         raise MissingDependency("OpenVDB is not installed")
 
     monkeypatch.setattr(importlib.import_module("core.surface.meshing.isosurface"), "load_openvdb", missing)
-    with pytest.raises(MissingDependency, match=r"quads need OpenVDB.*faces='triangles'"):
+    with pytest.raises(MissingDependency, match=r"quads need OpenVDB.*set faces to triangles"):
         reconstruct(shapes.sphere(200), Settings(resolution=16, faces="quads"))
