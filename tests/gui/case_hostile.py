@@ -75,7 +75,7 @@ def case(gui):
     assert volume.grids.load()
     gui.shot("4_saved")
 
-    # A disk that is full, and a folder that is read-only: all is delivered but the volume.
+    # A disk that is full, and a folder that is read-only: all is delivered but the volume, and the earlier one stays.
     small = gui.folder / "small"
     small.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(small)]
@@ -89,8 +89,11 @@ def case(gui):
         if options:
             subprocess.run(["mount", *options, str(small)], check=True)
         result = yield from run()
-        assert {obj["vad_role"] for obj in result.objects} == {"samples", "surface"}
+        assert {obj["vad_role"] for obj in result.objects} == {"samples", "surface", "field"}
         assert result["vad_warnings"].startswith("No volume: "), result["vad_warnings"]
+        assert "is out of date" in result["vad_warnings"], result["vad_warnings"]
+        assert list(bpy.data.volumes) == [volume]
+        assert volume.grids.load()
         gui.shot(name)
 
     # No room for what is exchanged with the worker.
