@@ -276,20 +276,18 @@ def picture(path: Path) -> Path:
     given = (
         ("depth images of a tangle", tangle, np.asarray, View(), panels[0, :2]),
         ("a room from one spot", room, np.asarray, View((0.5, -1.0, 0.9)), panels[0, 2:]),
-        ("a frame of a depth camera", frame, in_room, View((-1.0, -0.3, 0.6)), panels[1, :2]),
-        ("voxels of a tangle", voxels, np.asarray, View(), panels[2, :2]),
+        ("a frame of a depth camera", frame, in_room, View((-1.0, -0.3, 0.6)), panels[1, :3]),
+        ("voxels of a tangle", voxels, np.asarray, View(), panels[2, :3]),
     )
-    for name, points, place, view, (left, right) in given:
+    for name, points, place, view, (left, right, *further) in given:
         camera = view.camera(place(points), _PIXELS)
         draw_points(left, place(points), camera)
         caption(left, name, f"{len(points):,} points")
-        cover = reconstruct(points).surface
-        draw_surface(right, replace(cover, vertices=place(cover.vertices)), camera, view)
-    stepped = reconstruct(frame, Settings(denoise=0)).surface
-    draw_surface(panels[1, 2], replace(stepped, vertices=in_room(stepped.vertices)), camera, view)
-    caption(panels[1, 2], "of its points as they come")
-    draw_surface(panels[2, 2], reconstruct(voxels, Settings(denoise=0)).surface, View().camera(voxels, _PIXELS), View())
-    caption(panels[2, 2], "of its points as they come")
+        for panel, settings in zip((right, *further), (Settings(), Settings(denoise=0)), strict=False):
+            cover = reconstruct(points, settings).surface
+            draw_surface(panel, replace(cover, vertices=place(cover.vertices)), camera, view)
+        for panel in further:
+            caption(panel, "of its points as they come")
     return save(figure, path)
 
 
