@@ -19,7 +19,7 @@ from ..mesh import Mesh, at_corners, face_normals
 from .rim_corners import Border
 
 _TO_RIM = 1.5  # cells, how far borders are taken to the surface's rims
-_CANCELLED = 1e-6  # cells, what is left at most of ways out of faces that lie opposite each other
+_LEAST, _CANCELLED = 1e-3, 1e-6  # cells, as which border edges of no length count; what opposite ones leave at most
 _LENGTH = 1.5  # smoothing length, local spacings
 _FARTHEST = 0.3  # local spacings, no border moves further
 _FREE = 0.25  # local spacings to either side of a corner, where borders turn as they like
@@ -34,7 +34,7 @@ _RELAXED, _DAMPING = 10, 0.5
 def at_rims(mesh: Mesh, surface: LocalSurface, cell: float) -> np.ndarray:
     """The mesh's vertices (v,3) with those at borders where they fall on the surface from a cell further out: at its
     rims, where these are that near, and a cell and a half off at most."""
-    way = _outward(mesh)
+    way = _outward(mesh, _LEAST * cell)
     loop = np.flatnonzero(np.linalg.norm(way, axis=1) > _CANCELLED * cell)
     if not len(loop):
         return mesh.vertices
@@ -86,8 +86,9 @@ def smooth_rims(mesh: Mesh, surface: LocalSurface, cell: float, at=None) -> Mesh
     return mesh.moved(vertices)
 
 
-def _outward(mesh):
-    """Directions (v,3) out of the faces at their borders, zero elsewhere: sums over border edges, by their length."""
+def _outward(mesh, least):
+    """Directions (v,3) out of the faces at their borders, zero elsewhere: sums over border edges, by their length, the
+    `least` or more."""
     vertices, edges = mesh.vertices, mesh.edges
     tail, head, third = (np.roll(mesh.faces, -k, axis=1).reshape(-1).astype(np.int64) for k in range(3))
     border = (edges.count[edges.number] == 1).reshape(-1)
@@ -97,7 +98,7 @@ def _outward(mesh):
     out = vertices[tail] - vertices[third]
     out -= (row_dots(out, along) / squared)[:, None] * along
     size = np.linalg.norm(out, axis=1)
-    out *= (np.sqrt(squared) / np.where(size > 0, size, 1.0))[:, None]
+    out *= (np.maximum(np.sqrt(squared), least) / np.where(size > 0, size, 1.0))[:, None]
     ends = np.concatenate([tail, head])
     return sums_of_each(ends, np.tile(out, (2, 1)), len(vertices))
 
