@@ -55,13 +55,13 @@ class Samples:
         kept = np.flatnonzero(~dropped)
         return _framed(self.given[kept], self.source_index[kept], (*self.warnings, warning))
 
-    def moved(self, points: np.ndarray) -> "Samples":
+    def moved(self, points: np.ndarray, *warnings: str) -> "Samples":
         """The samples at new places (n,3) of the unit frame, one of each that fell together; those that did not move
         stay exactly as given."""
         stirred = (points != self.points).any(axis=1)[:, None]
         points = np.rint(points / _QUANTUM) * _QUANTUM
         given = np.where(stirred, self.to_input_units(points), self.given)
-        moved = replace(self, points=points, given=given)
+        moved = replace(self, points=points, given=given, warnings=(*self.warnings, *warnings))
         return moved._of_rows(first_of_each(points, np.arange(len(points))))
 
     def _of_rows(self, rows):

@@ -1,7 +1,5 @@
 """Stray samples dropped, noisy ones moved: what the rest of the method then takes for the surface's own."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..points import Samples, local_spacing
@@ -34,10 +32,8 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
     moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 1.0))
     if done:
-        samples = samples.moved(moved)
         done |= {name: done[name] * samples.scale for name in ("noise", "mean_move", "voxel") if name in done}
-        if "voxel" in done:
-            samples = replace(samples, warnings=(*samples.warnings, _said_of_voxels(done["voxel"])))
+        samples = samples.moved(moved, *([_said_of_voxels(done["voxel"])] if "voxel" in done else []))
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
 
 
@@ -76,9 +72,8 @@ def _off_steps_of_depth(samples, strength, progress):
         return samples, {}
     largest = frame.step * np.abs(samples.given[:, frame.axis]).max() ** 2
     step = (1.0 if strength == "auto" else strength) * (moved - samples.given)
-    samples = samples.moved(samples.points + step / samples.scale)
     said = (
         f"depth is in steps of up to {largest:.2g}, as a depth camera sees it: points were moved off them; with "
         "denoise=0 they stay"
     )
-    return replace(samples, warnings=(*samples.warnings, said)), {"depth_step": float(largest)}
+    return samples.moved(samples.points + step / samples.scale, said), {"depth_step": float(largest)}

@@ -5,6 +5,7 @@ from scipy.spatial import ConvexHull, KDTree
 
 from ..parts import connected_parts
 from ..progress import Progress
+from ..trees import k_nearest
 from .surroundings import NEIGHBOURS, SHEET, Surroundings, thickness
 
 _GAP = 4.0  # times the local spacing on either side, that separates parts
@@ -56,9 +57,9 @@ def _beside_others(around, part, marked, progress):
     the end of a thin part the eight nearest neighbours of each sample may be of that end, though others are hardly
     further. A clump that hovers over a surface has its lowest samples near it alone."""
     rows, spacing = np.flatnonzero(marked[part]), around.spacing
-    found, k = np.zeros(len(rows), bool), range(1, 1 + min(_FURTHER, len(part)))
+    found = np.zeros(len(rows), bool)
     for some in progress.chunks(len(rows), _CHUNK):
-        distance, other = around.tree.query(around.points[rows[some]], k=k, workers=-1)
+        distance, other = k_nearest(around.tree, around.points[rows[some]], _FURTHER, workers=-1)
         close = distance < _BESIDE * np.minimum(spacing[rows[some], None], spacing[other])
         found[some] = (close & ~marked[part[other]]).any(axis=1)
     facing, size = (np.bincount(part[some], minlength=len(marked)) for some in (rows[found], rows))

@@ -1,7 +1,5 @@
 """Which samples are noisy."""
 
-from itertools import chain
-
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -56,10 +54,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
         return clean
     progress = Progress.of(progress)
     found = roughness(points, spacing, seed, progress)
-    parts = _noisy_anchors(points, spacing, found, seed, progress.part(0.1, 0.9))
-    if voxels is not None:
-        parts = chain([(_around_stairs(found, voxels), progress.part(0.1, 0.1))], parts)
-    for suspect, part in parts:
+    for suspect, part in _noisy_anchors(points, spacing, found, voxels, seed, progress.part(0.1, 0.9)):
         if suspect.any():
             level, beside = np.median(found.relative[suspect]), suspect[found.region[:, :SMOOTHING]]
             amid = suspect & beside.all(axis=1)
@@ -82,9 +77,12 @@ def _seems_only(points, spacing, anchors, amid, level, progress):
     return shows_flat_patches(points, spacing, amid, level)
 
 
-def _noisy_anchors(points, spacing, found, seed, progress):
-    """Which anchors are noisy by how rough they are found and how far normals agree, (m,) bool: all, where the cloud is
-    as a whole, and then those of its parts; each with a slice of the progress for a closer look."""
+def _noisy_anchors(points, spacing, found, voxels, seed, progress):
+    """Which anchors are noisy, (m,) bool: of voxels those around stairs; by how rough they are and how far normals
+    agree all, where the cloud is as a whole, and then those of its parts; each with a slice of the progress for a
+    closer look."""
+    if voxels is not None:
+        yield _around_stairs(found, voxels), progress.part(0.0, 0.0)
     if found.whole:
         agreement = _typical_agreement(points, spacing, seed, progress.part(0.0, 0.3))
         turned = agreement < 1 - _TURNED * np.median(found.relative) ** 2

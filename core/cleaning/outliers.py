@@ -58,8 +58,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     stray = np.zeros(len(points), bool)
     if len(points) < MINIMUM_SAMPLES:
         return stray
-    for turn in range(_ROUNDS):
-        part = progress.part(turn / _ROUNDS, (turn + 1) / _ROUNDS)
+    for turn, part in progress.turns(range(_ROUNDS)):
         kept = np.flatnonzero(~stray)
         around = Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > max(_DIRTY * len(points), _LONE)

@@ -11,7 +11,10 @@ from itertools import combinations, product
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import unit
+from ..lookup import is_among
 from ..points import SPACING_NEIGHBOURS
+from ..trees import k_nearest
 from .anchors import some_samples
 
 _LOOKED_AT, _NEAREST = 300, 8  # samples, and the nearest to each, whose offsets are looked at
@@ -67,8 +70,7 @@ class Voxels:
 
     def _taken(self, place):
         """Which of some places (m,3) samples have, (m,) bool."""
-        asked = place @ _NUMBERED
-        return self._numbers[np.minimum(np.searchsorted(self._numbers, asked), len(self._numbers) - 1)] == asked
+        return is_among(place @ _NUMBERED, self._numbers)
 
     @cached_property
     def _numbers(self):
@@ -82,7 +84,7 @@ def find_voxels(points, seed: int = 0) -> Voxels | None:
     if they lie on any; then the others are whole numbers of them.
     """
     rows = some_samples(points, min(_LOOKED_AT, len(points)), seed)
-    beside = KDTree(points).query(points[rows], k=range(2, 2 + min(_NEAREST, len(points) - 1)))[1]
+    beside = k_nearest(KDTree(points), points[rows], _NEAREST + 1)[1][:, 1:]
     offset = (points[beside] - points[rows, None]).reshape(-1, 3)
     length = np.linalg.norm(offset, axis=1)
     twins = KDTree(offset).query(offset, k=_TWINS + 1, workers=-1)[0][:, _TWINS] < _ALIKE * np.median(length)
@@ -106,10 +108,10 @@ def _shortest_independent(offset):
     """The first three of vectors (m,3) that are independent, (3,3); None where there are none."""
     if not len(offset):
         return None
-    unit = offset / np.linalg.norm(offset, axis=1, keepdims=True)
-    across = np.cross(unit[0], unit)
+    way = unit(offset)
+    across = np.cross(way[0], way)
     aside = np.flatnonzero(np.linalg.norm(across, axis=1) > _INDEPENDENT)
     if not len(aside):
         return None
-    out = np.flatnonzero(np.abs(unit @ across[aside[0]]) > _INDEPENDENT)
+    out = np.flatnonzero(np.abs(way @ across[aside[0]]) > _INDEPENDENT)
     return offset[[0, aside[0], out[0]]] if len(out) else None

@@ -525,16 +525,23 @@ def test_the_scan_is_shown_and_hidden_like_its_results(blender, run, scan):
         blender.ops.vad.show(role="sheet")
 
 
-@pytest.mark.parametrize("how", ["eye", "excluded", "off"])
-def test_what_cannot_be_shown_is_said(blender, run, scan, capfd, how):
-    surface, home = run()["surface"], blender.context.scene.vad.result
-    layer = blender.context.view_layer.layer_collection.children[home.name]
+def put_out_of_sight(how, obj, layer):
+    """By the eye of its collection, which is left out with "excluded", or by its monitor icon or its own eye."""
     if how == "eye":
         layer.hide_viewport = True
     elif how == "excluded":
         layer.exclude = True
+    elif how == "off":
+        obj.hide_viewport = True
     else:
-        surface.hide_viewport = True
+        obj.hide_set(True)
+
+
+@pytest.mark.parametrize("how", ["eye", "excluded", "off"])
+def test_what_cannot_be_shown_is_said(blender, run, scan, capfd, how):
+    surface, home = run()["surface"], blender.context.scene.vad.result
+    layer = blender.context.view_layer.layer_collection.children[home.name]
+    put_out_of_sight(how, surface, layer)
     for _ in range(2):
         blender.ops.vad.show(role="surface")
         assert "Warning: Scan surface is off, or its collection is hidden: show it in" in capfd.readouterr().out
@@ -550,15 +557,7 @@ def test_what_cannot_be_shown_is_said(blender, run, scan, capfd, how):
 @pytest.mark.parametrize("how", ["eye", "excluded", "off", "its own eye"])
 def test_a_run_says_where_its_mesh_is_not_seen(blender, run, scan, capfd, how):
     surface, home = run()["surface"], blender.context.scene.vad.result
-    layer = blender.context.view_layer.layer_collection.children[home.name]
-    if how == "eye":
-        layer.hide_viewport = True
-    elif how == "excluded":
-        layer.exclude = True
-    elif how == "off":
-        surface.hide_viewport = True
-    else:
-        surface.hide_set(True)
+    put_out_of_sight(how, surface, blender.context.view_layer.layer_collection.children[home.name])
     make_active(blender, scan)
     for again in (run, blender.ops.vad.reextract):
         capfd.readouterr()
