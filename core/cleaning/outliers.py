@@ -8,22 +8,23 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..given_arrays import finite_points
-from ..neighbourhoods.quadrics import fit_quadrics
+from ..linalg import unit
 from ..progress import Progress
+from ..trees import k_nearest
 from .detached import detached_clouds
 from .far_parts import far_parts
 from .off_wires import off_wires
-from .surroundings import SHEET, Surroundings, thickness
+from .standing_out import hovering, proud
+from .surroundings import NEIGHBOURS, SHEET, Surroundings, thickness
 
 MINIMUM_SAMPLES = 100  # fewer leave nothing to compare a sample with
 
-_ROUNDS = 4  # strays hide strays
+_ROUNDS = 6  # strays hide strays
 _LONELY = 2.0  # spacing over that of the neighbours
 _ALONE = 5.0  # so lonely that the plane no longer matters
 _OFF = 2.0  # distance from the neighbours' plane over their spacing
 _ASTRAY, _FEW = 0.01, 5  # share and number of samples off all wires above which they are strays: ends of wires are, too
-_AT_ITS_HEIGHT = 24, 6, 0.15  # samples with itself; so many this close to its height, over their spacing, are a sheet
-_PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
+_TIP = 65, 1.25, 0.75  # samples with itself; times as far as the nearest; least over largest way from their midst
 _BEHIND = 1.1, 0.7  # spacing and distance off the neighbours' plane of samples that may be a sheet behind another's
 _LAYER, _FLAT = 7, 0.1  # so many of these are such a sheet where so thin: of strays at all heights most have above .2
 _MANY_PROUD = 0.00125  # share of such samples above which they are strays: corners have some
@@ -33,9 +34,6 @@ _CHUNK = 8192  # samples
 
 _DIRTY, _LONE = 0.0005, 1  # share and number of strays above which those close to the surface are looked for, too
 _STRICT = 0.7  # share of the limits above that then holds for those beside a surface
-_FITTED = 20  # neighbours of the quadrics that those are measured against
-_HOVERING = 6.0  # distance from the quadric over the largest of the medians around each neighbour
-_HOVERING_FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
 
 
 def find_outliers(points, progress=None) -> np.ndarray:
@@ -52,7 +50,8 @@ def find_outliers(points, progress=None) -> np.ndarray:
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
     A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
-    Nor is one of these, or beside a surface, that is in a sparse sheet behind a dense one, where most that seem so are.
+    Nor is one of these, or beside a surface, that is in a sparse sheet behind a dense one, where most that seem so are,
+    or the tip of a cone or the pole of a sphere whose vertices lie on rings. None hovers where sheets cross.
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
@@ -62,11 +61,12 @@ def find_outliers(points, progress=None) -> np.ndarray:
         kept = np.flatnonzero(~stray)
         around = Surroundings(points[kept], part.part(0.0, 0.6))
         dirty = stray.sum() > max(_DIRTY * len(points), _LONE)
-        beside, proud = _beside(around, _STRICT if dirty else 1.0), _proud(around)
-        behind, suspect = _behind_others(around), beside | proud
+        beside, above = _beside(around, _STRICT if dirty else 1.0), proud(around)
+        behind, suspect = _behind_others(around), beside | above
         if turn == 0:  # a few strays among many lie in a plane by chance
             are_behind = behind[suspect].sum() > _MAJORITY * suspect.sum()
         others = ~(behind & are_behind)
+        others[suspect] &= ~_at_tips(around, np.flatnonzero(suspect))
         found = far_parts(around.points) | (beside & others)
         found |= _scattered(around, part.part(0.6, 0.7))
         part(0.7)
@@ -74,11 +74,11 @@ def find_outliers(points, progress=None) -> np.ndarray:
         among_wires = off_wires(around, _LONELY)
         if dirty or _many(among_wires, _ASTRAY):
             found |= among_wires
-        proud &= others
-        if _many(proud, _MANY_PROUD):
-            found |= proud
+        above &= others
+        if _many(above, _MANY_PROUD):
+            found |= above
         if dirty:
-            found |= _hovering(around, part.part(0.8, 1.0)) & others
+            found |= hovering(around, part.part(0.8, 1.0)) & others
         stray[kept[found]] = True
         if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
             break
@@ -116,36 +116,16 @@ def _behind_others(around):
     return found
 
 
-def _proud(around):
-    lonely, off, over_theirs = _PROUD
-    found = (around.lonely > lonely) & (around.off > off) & ~around.wire
-    return _standing_out(around, found, around.off, over_theirs)
-
-
-def _hovering(around, progress):
-    height = fit_quadrics(around.points, np.arange(len(around.points)), _FITTED, progress).left_out()
-    far = (height > _HOVERING_FAR * around.spacing) & (around.off > _HOVERING_FAR)
-    return _standing_out(around, far & ~around.wire, height, _HOVERING)
-
-
-def _standing_out(around, found, height, times):
-    """Which of the samples `found` have so many times the largest of the median heights around each neighbour, and are
-    in no sheet of their own."""
-    row, neighbours = np.flatnonzero(found), around.neighbours
-    theirs = np.median(height[neighbours[neighbours[row]]], axis=2).max(axis=1)
-    found[row] = (height[row] > times * theirs) & ~_in_sheet(around, row)
-    return found
-
-
-def _in_sheet(around, row):
-    """Which of samples `row` (m,) lie in a sheet of their own close beside another one: samples around are at their
-    height above the flattest neighbourhood near them."""
-    count, fewest, off = _AT_ITS_HEIGHT
-    points, near = around.points, around.neighbours[row, 1:]
-    flattest = near[np.arange(len(row)), around.thickness[near].argmin(axis=1)]
-    others = around.tree.query(points[row], k=range(2, min(count, len(points)) + 1))[1]
-    height = np.einsum("mki,mi->mk", points[others] - points[row, None], around.across[flattest])
-    return (np.abs(height) < off * around.spacing[flattest, None]).sum(axis=1) >= fewest
+def _at_tips(around, row):
+    """Which of samples `row` (m,) are tips of cones and poles of rings: the nearest lie around, none in the midst."""
+    count, near, hollow = _TIP
+    distance, other = k_nearest(around.tree, around.points[row], count)
+    weight = (distance < near * distance[:, 1:2]) & (distance > 0.0)
+    towards = unit(around.points[other] - around.points[row, None])
+    count = weight.sum(axis=1)
+    midst = np.einsum("mk,mki->mi", weight.astype(float), towards) / count[:, None]
+    away = np.where(weight, 1.0 - np.einsum("mki,mi->mk", towards, midst), np.nan)
+    return (count >= NEIGHBOURS) & (np.nanmin(away, axis=1) > hollow * np.nanmax(away, axis=1))
 
 
 def _scattered(around, progress):

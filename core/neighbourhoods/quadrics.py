@@ -90,6 +90,12 @@ def fit_quadrics(points, rows, neighbours: int, progress=None, clusters: Cluster
     return replace(found, leverage=share * found.leverage)
 
 
+def quadrics_at(points, places, neighbours: int, progress=None) -> Quadrics:
+    """The same at places (m,3) that are none of the points, which have no part in them: none has leverage."""
+    (found,) = _through(points, places, (neighbours,), _quadrics, progress)
+    return found
+
+
 def nested_quadrics(points, rows, sizes, progress=None) -> list[Quadrics]:
     """The same through each of several numbers of neighbours, `sizes`, in rising order, all of them singly."""
     return _through(points, points[rows], sizes, _quadrics, progress)

@@ -243,3 +243,41 @@ def test_clumps_that_hover_over_a_surface_are_found():
     stray = find_outliers(np.concatenate([shapes.scattered_sphere(20000), *clumps]))
     assert stray[:20000].sum() <= 1
     assert stray[20000:].all()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_strays_that_lean_on_each_other_are_found(seed):
+    """Of two strays beside each other each bends the plane and the quadric that the other is measured against."""
+    rng, spacing = np.random.default_rng(seed), np.sqrt(4 * np.pi / 5000)
+    up = shapes.scattered_sphere(60, seed)
+    pairs = [(1 + rng.uniform(1.5, 4, (60, 1)) * spacing) * up + 0.5 * spacing * rng.normal(size=(60, 3)) for _ in "ab"]
+    points, stray = with_strays(np.concatenate([*pairs, rng.uniform(-1.5, 1.5, (50, 3))]))
+    marked = find_outliers(points)
+    assert marked[np.abs(np.linalg.norm(points, axis=1) - 1) > spacing].all()
+    assert not marked[~stray].any()
+
+
+def test_where_sheets_cross_few_samples_go_with_strays():
+    rng = np.random.default_rng(2)
+    crossing = rng.uniform(-1.0, 1.0, (6000, 3))
+    crossing[:3000, 2] = crossing[3000:, 0] = 0.0
+    marked = find_outliers(np.vstack([crossing, rng.uniform(-1.2, 1.2, (200, 3))]))
+    assert marked[:6000].sum() <= 3
+    assert marked[6000:].mean() > 0.95
+
+
+@pytest.mark.parametrize("around", [32, 64])
+@pytest.mark.parametrize("height", [0.0, 1.0, 2.0])
+def test_poles_and_tips_of_rings_of_vertices_stay(around, height):
+    turn = 2 * np.pi * np.arange(around) / around
+    out = np.arange(1, 20)[:, None] / 20
+    rings = np.stack([out * np.cos(turn), out * np.sin(turn), height * (1 - out) + 0 * turn], axis=2).reshape(-1, 3)
+    assert not find_outliers(np.vstack([rings, [[0, 0, height]]])).any()
+
+
+def test_strays_that_more_and_more_others_hide_are_found():
+    """Each outer one of a string of far strays is lonely once those within are gone."""
+    string = np.array([[2.0, 0, 0], [2.1, 0, 0.1], [2.5, 0, 0], [3.3, 0.5, 0]])
+    strays = np.vstack([turn * string[:, [a, b, c]] for turn in (1, -1) for a, b, c in ((0, 1, 2), (1, 2, 0))])
+    points, stray = with_strays(strays)
+    np.testing.assert_array_equal(find_outliers(points), stray)

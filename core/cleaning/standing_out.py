@@ -1,0 +1,81 @@
+"""Samples that stand out above a surface while those around them do not."""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..neighbourhoods.quadrics import fit_quadrics, quadrics_at
+from ..progress import Progress
+from ..trees import k_nearest
+from .surroundings import NEIGHBOURS, Surroundings
+
+_AT_ITS_HEIGHT = 24, 6, 0.15  # samples with itself; so many this close to its height, over their spacing, are a sheet
+_PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
+_FITTED = 20  # neighbours of the quadrics that heights are measured against
+_SUSPECT = 1.4  # spacing over that of the neighbours
+_HOVERING = 7.5  # distance from the quadric over the largest of the medians around each neighbour
+_FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
+_PLANES = 16, 0.15, 2  # the nearest; so close to the planes of so many of these, over their spacing, sheets cross
+_FEWEST = 100  # samples that are no suspects, of which fewer are no surface to measure against
+
+
+def proud(around: Surroundings) -> np.ndarray:
+    """(n,) bool: which samples are a little lonely and off their neighbours' plane, where none of these is."""
+    lonely, off, over_theirs = _PROUD
+    found = (around.lonely > lonely) & (around.off > off) & ~around.wire
+    found = _standing_out(around, found, around.off, over_theirs)
+    row = np.flatnonzero(found)
+    found[row] = ~_in_sheet(around, row)
+    return found
+
+
+def hovering(around: Surroundings, progress: Progress) -> np.ndarray:
+    """(n,) bool: which samples are far off the quadric of their neighbours, where these are not.
+
+    Strays hide those beside them: what may be one is measured against the surface of all the others.
+    """
+    points = around.points
+    height = fit_quadrics(points, np.arange(len(points)), _FITTED, progress.part(0.0, 0.6)).left_out()
+    higher = (around.off > _FAR) & (height > _FAR * around.spacing)
+    suspect = (_standing_out(around, higher, height, 1.0) | (around.lonely > _SUSPECT)) & ~around.wire
+    row = np.flatnonzero(suspect)
+    suspect[row] = ~_in_sheet(around, row)
+    row, rest = np.flatnonzero(suspect), np.flatnonzero(~suspect)
+    if not len(row) or len(rest) < _FEWEST:
+        return np.zeros(len(points), bool)
+    surface, tree = points[rest], KDTree(points[rest])
+    near = k_nearest(tree, points[row], NEIGHBOURS)[1]
+    around_near, row_near = np.unique(k_nearest(tree, surface[near], NEIGHBOURS + 1)[1], return_inverse=True)
+    theirs = fit_quadrics(surface, around_near, _FITTED, progress.part(0.6, 0.8)).left_out()[row_near]
+    theirs = np.median(theirs.reshape(*near.shape, -1), axis=2).max(axis=1)
+    height = quadrics_at(surface, points[row], _FITTED, progress.part(0.8, 1.0)).height
+    spacing = np.median(around.spacing[rest[near]], axis=1)
+    above = height > np.maximum(_HOVERING * theirs, _FAR * spacing)
+    suspect[row] = above & ~_where_sheets_cross(around, row, rest, tree)
+    return suspect
+
+
+def _where_sheets_cross(around, row, rest, tree):
+    """Which of samples `row` (m,) lie in the planes of several of those near among `rest`, of which the tree is."""
+    count, close, several = _PLANES
+    near = rest[k_nearest(tree, around.points[row], count)[1]]
+    height = np.einsum("mki,mki->mk", around.points[row, None] - around.centre[near], around.across[near])
+    return (np.abs(height) < close * around.spacing[near]).sum(axis=1) >= several
+
+
+def _standing_out(around, found, height, times):
+    """Which of the samples `found` have so many times the largest of the median heights around each neighbour."""
+    row, neighbours = np.flatnonzero(found), around.neighbours
+    theirs = np.median(height[neighbours[neighbours[row]]], axis=2).max(axis=1)
+    found[row] = height[row] > times * theirs
+    return found
+
+
+def _in_sheet(around, row):
+    """Which of samples `row` (m,) lie in a sheet of their own close beside another one: samples around are at their
+    height above the flattest neighbourhood near them."""
+    count, fewest, off = _AT_ITS_HEIGHT
+    points, near = around.points, around.neighbours[row, 1:]
+    flattest = near[np.arange(len(row)), around.thickness[near].argmin(axis=1)]
+    others = around.tree.query(points[row], k=range(2, min(count, len(points)) + 1))[1]
+    height = np.einsum("mki,mi->mk", points[others] - points[row, None], around.across[flattest])
+    return (np.abs(height) < off * around.spacing[flattest, None]).sum(axis=1) >= fewest
