@@ -131,7 +131,19 @@ def _flaps(mesh, folded, cut):
 
 
 def _relaxed(mesh, chosen, surface, cell):
-    """The mesh with the vertices `chosen`, (v,) bool, that may move among their neighbours."""
+    """The mesh with the vertices `chosen`, (v,) bool, among their neighbours and on the surface, where they may move."""
+    mesh, before = smoothed(mesh, chosen, _STEPS), mesh.vertices
+    row = np.flatnonzero((mesh.vertices != before).any(axis=1))
+    vertices, found = mesh.vertices.copy(), surface.project(mesh.vertices[row])
+    on = found.distance <= _ON * cell
+    vertices[row[on]] -= found.step[on]
+    return mesh.moved(vertices)
+
+
+def smoothed(mesh: Mesh, chosen: np.ndarray, steps: int) -> Mesh:
+    """The mesh with the vertices `chosen`, (v,) bool, moved towards the middle of their neighbours (Laplacian
+    smoothing), in so many steps; those at lines of more than two faces along these, but for those at their ends and
+    next to where they branch, which stay, as those at borders do."""
     n, vertices, edges = len(mesh.vertices), mesh.vertices.copy(), mesh.edges
     on_line, on_border = (edges.ends_at(kind) for kind in (edges.count > 2, edges.count == 1))
     tail, head = np.append(edges.low, edges.high), np.append(edges.high, edges.low)
@@ -146,9 +158,6 @@ def _relaxed(mesh, chosen, surface, cell):
     link = line | (on_line[tail] == 0)
     links = coo_matrix((np.ones(link.sum()), (tail[link], head[link])), shape=(n, n)).tocsr()[row]
     degree = np.diff(links.indptr)[:, None]
-    for _ in range(_STEPS):
+    for _ in range(steps):
         vertices[row] += _DAMPING * (links @ vertices / degree - vertices[row])
-    found = surface.project(vertices[row])
-    on = found.distance <= _ON * cell
-    vertices[row[on]] -= found.step[on]
     return mesh.moved(vertices)
