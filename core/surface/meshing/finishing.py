@@ -10,7 +10,7 @@ from .centring import centred
 from .corners import into_corners
 from .evening import FLAT
 from .unfolding import unfolded
-from .untangling import untangled
+from .untangling import taken_back, untangled
 
 _ASIDE, _BACK = 0.3, 0.5  # cells to one side, where the sheet of a vertex is told, and of the foot there off the vertex
 _INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, and to a line where sheets pass through
@@ -19,10 +19,11 @@ _INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, a
 def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
     """The mesh with sharp creases, see :func:`sharpened`, without the folds that these and lines may make, see
     :func:`unfolded`, and with its faces astride the surface, see :func:`centred`."""
-    mesh = untangled(mesh)
-    sharp = sharpened(mesh, passing, surface, cell, progress)
-    mesh = unfolded(sharp, surface, cell, held=(sharp.vertices != mesh.vertices).any(axis=1))
-    return untangled(centred(mesh))
+    before = untangled(mesh, surface)
+    mesh = sharpened(before, passing, surface, cell, progress.part(0.0, 0.6))
+    mesh = centred(unfolded(mesh, surface, cell, held=(mesh.vertices != before.vertices).any(axis=1)))
+    mesh = untangled(mesh, surface)
+    return taken_back(sharpened(mesh, passing, surface, cell, progress.part(0.6, 1.0)), mesh.vertices)
 
 
 def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:

@@ -7,53 +7,64 @@ other one: there the mesh goes round in a loop.
 import numpy as np
 from scipy.spatial import KDTree
 
+from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, lengths
-from ...parts import connected_parts
 from ..mesh import Mesh, at_corners, face_normals
 from .unfolding import smoothed
 
 _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; around what crosses one has less
-_ROUNDS = 4  # with one step of smoothing more each time
+_AROUND = 3  # rings of faces around these that are looked at
+_ROUNDS = 4  # with one step more each time, and a ring of vertices more every second time
 _USUAL = 99  # per cent of the faces, above whose size others are looked for one by one
 
 
-def untangled(mesh: Mesh) -> Mesh:
+def untangled(mesh: Mesh, surface: LocalSurface) -> Mesh:
     """The mesh with vertices of faces that pass through others moved towards the middle of their neighbours (Laplacian
-    smoothing), a little further each time, until no two of them do.
+    smoothing), a little further each time, until no two of them do, and from there onto the surface if none do then.
 
-    Looked for where the mesh bends sharply. Vertices at borders stay, those of lines of more than two faces move along
-    these; where faces still cross at last, as sheets do that pass through each other, all is left as it was.
+    Vertices at borders stay, those of lines of more than two faces move along these; where faces still cross at last,
+    as sheets do that pass through each other, all is left as it was.
     """
+    loose = _without_crossings(mesh, mesh.vertices, smoothed)
+    row = np.flatnonzero((loose.vertices != mesh.vertices).any(axis=1))
+    if not len(row):
+        return mesh
+    vertices = loose.vertices.copy()
+    vertices[row] -= surface.project(vertices[row]).step
+    return taken_back(loose.moved(vertices), loose.vertices)
+
+
+def taken_back(mesh: Mesh, before: np.ndarray) -> Mesh:
+    """The mesh with vertices of faces that pass through others where they were `before`, (v,3)."""
+    return _without_crossings(mesh, before, None)
+
+
+def _without_crossings(mesh, before, smooth):
+    """The mesh with vertices of faces that cross moved in rounds: by `smooth` or, where that is None, to where they
+    were `before`, (v,3). Where it fails, vertices are there, too, that were moved in the last round."""
     bent = mesh.normals[1] < _BENT
     if not bent.any():
         return mesh
-    near = mesh.faces_at(mesh.vertices_of(mesh.faces_at(bent)))
-    row = np.flatnonzero(mesh.vertices_of(near))
-    part, held = mesh.part(near), mesh.vertices_of(~near)[row]
-    start, asked = part.vertices, np.ones(len(part.faces), bool)
+    for _ in range(_AROUND):
+        near = mesh.faces_at(bent)
+        bent = mesh.vertices_of(near)
+    row = np.flatnonzero(bent)
+    part, held, start = mesh.part(near), mesh.vertices_of(~near)[row], before[row]
+    asked = part.faces_at(part.normals[1] < _BENT)
     for step in range(_ROUNDS + 1):
         tangled = part.vertices_of(crossing_faces(part, asked).reshape(-1))
-        if step == _ROUNDS or not tangled.any():
+        if not tangled.any():
             break
-        part = smoothed(part, tangled & ~held, step + 1)
+        for _ in range(step // 2):
+            tangled = part.vertices_of(part.faces_at(tangled))
+        if smooth is None or step == _ROUNDS:
+            part = part.moved(np.where(tangled[:, None], start, part.vertices))
+        else:
+            part = smooth(part, tangled & ~held, step + 1)
         asked = part.faces_at(tangled)
-    return mesh.moved(_with(mesh.vertices, row, _back(part, start, tangled)))
-
-
-def _with(vertices, row, places):
-    vertices = vertices.copy()
-    vertices[row] = places
-    return vertices
-
-
-def _back(mesh, before, tangled):
-    """The vertices of a mesh, as they were `before` (v,3) where those moved hang together with some that are still
-    `tangled`, (v,) bool."""
-    moved = (mesh.vertices != before).any(axis=1) | tangled
-    low, high = mesh.edges.low, mesh.edges.high
-    inside = moved[low] & moved[high]
-    group = connected_parts(low[inside], high[inside], len(moved))
-    return np.where(np.isin(group, group[tangled])[:, None], before, mesh.vertices)
+    vertices = mesh.vertices.copy()
+    vertices[row] = part.vertices
+    return mesh.moved(vertices)
 
 
 def crossing_faces(mesh: Mesh, asked: np.ndarray) -> np.ndarray:
