@@ -19,14 +19,17 @@ _INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, a
 def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
     """The mesh with sharp creases, see :func:`sharpened`, without the folds that these and lines may make, see
     :func:`unfolded`, and with its faces astride the surface, see :func:`centred`."""
-    before = untangled(mesh, surface)
-    mesh = sharpened(before, passing, surface, cell, progress.part(0.0, 0.6))
-    mesh = centred(unfolded(mesh, surface, cell, held=(mesh.vertices != before.vertices).any(axis=1)))
-    mesh = untangled(mesh, surface)
-    return taken_back(sharpened(mesh, passing, surface, cell, progress.part(0.6, 1.0)), mesh.vertices)
+    sharp = sharpened(mesh, passing, surface, cell, progress.part(0.0, 0.6))
+    mesh = centred(unfolded(sharp, surface, cell, held=(sharp.vertices != mesh.vertices).any(axis=1)))
+    loose = untangled(mesh, surface)
+    moved = (loose.vertices != mesh.vertices).any(axis=1)
+    if not moved.any():
+        return mesh
+    among = loose.vertices_of(loose.faces_at(moved))
+    return taken_back(sharpened(loose, passing, surface, cell, progress.part(0.6, 1.0), among), loose.vertices)
 
 
-def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
+def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress, among=True) -> Mesh:
     """The mesh, whose vertices lie on the surface, with those next to creases taken into them: inward ones, then
     outward ones, which are inward seen from inside. Wedges along lines where sheets pass through one another are
     outward creases; they start far from their edge, and are looked at once more.
@@ -37,7 +40,7 @@ def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: floa
     farthest = _farthest(mesh.vertices, passing, surface)
     for outward, part in progress.turns(ways):
         vertices, (normal, least) = mesh.vertices, mesh.normals
-        row, side = np.flatnonzero(mesh.vertices_of(mesh.faces_at(least < FLAT))), np.zeros_like(vertices)
+        row, side = np.flatnonzero(mesh.vertices_of(mesh.faces_at(least < FLAT)) & among), np.zeros_like(vertices)
         way = outward * normal[row]
         found = surface.project(vertices[row] + _ASIDE * cell * way, part.part(0.0, 0.5))
         direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell

@@ -4,18 +4,20 @@ Next to an outward edge either sheet goes on for a while in the field, so vertic
 other one: there the mesh goes round in a loop.
 """
 
+from itertools import chain
+
 import numpy as np
-from scipy.spatial import KDTree
 
 from ...field.local_surface import LocalSurface
 from ...linalg import cross, dots, lengths
+from ...trees import quick_tree
 from ..mesh import Mesh, at_corners, face_normals
 from .unfolding import smoothed
 
 _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; around what crosses one has less
 _AROUND = 3  # rings of faces around these that are looked at
 _ROUNDS = 4  # with one step more each time, and a ring of vertices more every second time
-_USUAL = 99  # per cent of the faces, above whose size others are looked for one by one
+_SMALL = 0.98  # share of the faces, above whose size others are looked for apart
 
 
 def untangled(mesh: Mesh, surface: LocalSurface) -> Mesh:
@@ -25,7 +27,7 @@ def untangled(mesh: Mesh, surface: LocalSurface) -> Mesh:
     Vertices at borders stay, those of lines of more than two faces move along these; where faces still cross at last,
     as sheets do that pass through each other, all is left as it was.
     """
-    loose = _without_crossings(mesh, mesh.vertices, smoothed)
+    loose = _without_crossings(mesh, mesh.vertices, mesh.normals[1] < _BENT, smoothed)
     row = np.flatnonzero((loose.vertices != mesh.vertices).any(axis=1))
     if not len(row):
         return mesh
@@ -36,21 +38,22 @@ def untangled(mesh: Mesh, surface: LocalSurface) -> Mesh:
 
 def taken_back(mesh: Mesh, before: np.ndarray) -> Mesh:
     """The mesh with vertices of faces that pass through others where they were `before`, (v,3)."""
-    return _without_crossings(mesh, before, None)
+    return _without_crossings(mesh, before, (mesh.vertices != before).any(axis=1), None)
 
 
-def _without_crossings(mesh, before, smooth):
-    """The mesh with vertices of faces that cross moved in rounds: by `smooth` or, where that is None, to where they
-    were `before`, (v,3). Where it fails, vertices are there, too, that were moved in the last round."""
-    bent = mesh.normals[1] < _BENT
-    if not bent.any():
+def _without_crossings(mesh, before, asked, smooth):
+    """The mesh with vertices of faces that cross, one of which has a vertex `asked`, (v,) bool, moved in rounds: by
+    `smooth` or, where that is None, to where they were `before`, (v,3). Where it fails, there are those, too, that were
+    moved in the last round."""
+    if not asked.any():
         return mesh
+    around = asked
     for _ in range(_AROUND):
-        near = mesh.faces_at(bent)
-        bent = mesh.vertices_of(near)
-    row = np.flatnonzero(bent)
+        near = mesh.faces_at(around)
+        around = mesh.vertices_of(near)
+    row = np.flatnonzero(around)
     part, held, start = mesh.part(near), mesh.vertices_of(~near)[row], before[row]
-    asked = part.faces_at(part.normals[1] < _BENT)
+    asked = part.faces_at(asked[row])
     for step in range(_ROUNDS + 1):
         tangled = part.vertices_of(crossing_faces(part, asked).reshape(-1))
         if not tangled.any():
@@ -101,15 +104,14 @@ def _close(corners, asked):
     """Pairs of faces with `corners` (3,3,f) whose boxes overlap, one of them among those `asked`, (p,) each."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre, radius = 0.5 * (low + high).T, 0.5 * lengths(high - low)
-    usual = np.percentile(radius, _USUAL)
-    small, large = np.flatnonzero(radius <= usual), np.flatnonzero(radius > usual)
-    pairs = [small[KDTree(centre[small]).query_pairs(2 * usual, output_type="ndarray").T]]
-    for others, reach in ((small, usual), (large, radius.max())) if len(large) else ():
-        near = KDTree(centre[others]).query_ball_point(centre[large], radius[large] + reach)
-        pairs.append(np.stack([np.repeat(large, [len(each) for each in near]), others[np.concatenate(near).astype(int)]]))
+    row, order, pairs = np.flatnonzero(asked), np.argsort(radius, kind="stable"), []
+    for others in np.split(order, [int(_SMALL * len(order))]):
+        if len(others):
+            near = quick_tree(centre[others]).query_ball_point(centre[row], radius[row] + radius[others[-1]], workers=-1)
+            other = others[np.fromiter(chain.from_iterable(near), np.intp)]
+            pairs.append((np.repeat(row, [len(each) for each in near]), other))
     one, other = np.concatenate(pairs, axis=1)
-    ordered = (radius[one] <= usual) | (radius[other] <= usual) | (one < other)
-    one, other = (each[ordered & (asked[one] | asked[other])] for each in (one, other))
-    overlap = np.maximum(low[:, one], low[:, other]) <= np.minimum(high[:, one], high[:, other])
-    kept = overlap.all(axis=0)
+    kept = (one < other) | ~asked[other]
+    one, other = one[kept], other[kept]
+    kept = (np.maximum(low[:, one], low[:, other]) <= np.minimum(high[:, one], high[:, other])).all(axis=0)
     return one[kept], other[kept]

@@ -17,6 +17,7 @@ from ..edges.meetings import Meetings
 from ..mesh import Mesh
 from ..meshing.finishing import finished
 from ..meshing.misfit import chamfer, misfit
+from ..meshing.untangling import untangled
 from ..signed import signed_mesh
 from ..signs.sides import Sides
 from ..signs.two_sides import LONG
@@ -101,7 +102,7 @@ def boundary_of_inside(
     mesh = signed_mesh(signed, meetings.passing, surface, grid, progress)
     if not meetings.side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
         return mesh
-    outer = mended(one_side(cover(), signed, surface, grid), surface, grid.spacing)
+    outer = untangled(mended(one_side(cover(), signed, surface, grid), surface, grid.spacing), surface)
     closed = (outer.edge_counts()[1] == 2).all()
     closer = closed and chamfer(outer, surface, grid.spacing) < chamfer(mesh, surface, grid.spacing)
     return outer if closer else mesh
