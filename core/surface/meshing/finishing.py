@@ -18,7 +18,8 @@ _INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, a
 
 def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
     """The mesh with sharp creases, see :func:`sharpened`, without the folds that these and lines may make, see
-    :func:`unfolded`, and with its faces astride the surface, see :func:`centred`."""
+    :func:`unfolded`, with its faces astride the surface, see :func:`centred`, and without those that pass through
+    others, see :func:`untangled`; what these leave blunt is made sharp once more, where none do then."""
     sharp = sharpened(mesh, passing, surface, cell, progress.part(0.0, 0.6))
     mesh = centred(unfolded(sharp, surface, cell, held=(sharp.vertices != mesh.vertices).any(axis=1)))
     loose = untangled(mesh, surface)
@@ -29,12 +30,14 @@ def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float
     return taken_back(sharpened(loose, passing, surface, cell, progress.part(0.6, 1.0), among), loose.vertices)
 
 
-def sharpened(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress, among=True) -> Mesh:
+def sharpened(
+    mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress, among=True
+) -> Mesh:
     """The mesh, whose vertices lie on the surface, with those next to creases taken into them: inward ones, then
     outward ones, which are inward seen from inside. Wedges along lines where sheets pass through one another are
     outward creases; they start far from their edge, and are looked at once more.
 
-    passing : (n,) bool, the samples close to such lines
+    passing : (n,) bool, the samples close to such lines     among : (v,) bool, vertices that may move, or True for all
     """
     ways = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
     farthest = _farthest(mesh.vertices, passing, surface)

@@ -131,7 +131,7 @@ def _flaps(mesh, folded, cut):
 
 
 def _relaxed(mesh, chosen, surface, cell):
-    """The mesh with the vertices `chosen`, (v,) bool, among their neighbours and on the surface, where they may move."""
+    """The mesh with the vertices `chosen`, (v,) bool, that may move among their neighbours and on the surface."""
     mesh, before = smoothed(mesh, chosen, _STEPS), mesh.vertices
     row = np.flatnonzero((mesh.vertices != before).any(axis=1))
     vertices, found = mesh.vertices.copy(), surface.project(mesh.vertices[row])

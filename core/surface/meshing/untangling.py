@@ -18,6 +18,7 @@ _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; ar
 _AROUND = 3  # rings of faces around these that are looked at
 _ROUNDS = 4  # with one step more each time, and a ring of vertices more every second time
 _SMALL = 0.98  # share of the faces, above whose size others are looked for apart
+_AT_ONCE = 1 << 13  # faces
 
 
 def untangled(mesh: Mesh, surface: LocalSurface) -> Mesh:
@@ -104,14 +105,14 @@ def _close(corners, asked):
     """Pairs of faces with `corners` (3,3,f) whose boxes overlap, one of them among those `asked`, (p,) each."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre, radius = 0.5 * (low + high).T, 0.5 * lengths(high - low)
-    row, order, pairs = np.flatnonzero(asked), np.argsort(radius, kind="stable"), []
+    row, order, pairs = np.flatnonzero(asked), np.argsort(radius, kind="stable"), [np.empty((2, 0), np.intp)]
     for others in np.split(order, [int(_SMALL * len(order))]):
-        if len(others):
-            near = quick_tree(centre[others]).query_ball_point(centre[row], radius[row] + radius[others[-1]], workers=-1)
+        tree, reach = quick_tree(centre[others]), radius[others].max(initial=0.0)
+        for part in np.split(row, range(_AT_ONCE, len(row), _AT_ONCE)):
+            near = tree.query_ball_point(centre[part], radius[part] + reach, workers=-1)
             other = others[np.fromiter(chain.from_iterable(near), np.intp)]
-            pairs.append((np.repeat(row, [len(each) for each in near]), other))
-    one, other = np.concatenate(pairs, axis=1)
-    kept = (one < other) | ~asked[other]
-    one, other = one[kept], other[kept]
-    kept = (np.maximum(low[:, one], low[:, other]) <= np.minimum(high[:, one], high[:, other])).all(axis=0)
-    return one[kept], other[kept]
+            one = np.repeat(part, [len(each) for each in near])
+            kept = (np.maximum(low[:, one], low[:, other]) <= np.minimum(high[:, one], high[:, other])).all(axis=0)
+            kept &= (one < other) | ~asked[other]
+            pairs.append(np.stack([one[kept], other[kept]]))
+    return np.concatenate(pairs, axis=1)
