@@ -184,12 +184,17 @@ def seen_from(surface, x: np.ndarray, sample, distance) -> Nearby:
     height = dots(offset, normals)
     lateral = offset - height * normals
     bend = np.stack([component.take(sample) for component in columns.bend])
-    xx, yy, zz, xy, xz, yz = bend
-    bent = np.stack([dots(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
+    bent = _bent(bend, lateral)
     above = (height - 0.5 * dots(lateral, bent)) / np.sqrt(1 + dots(bent, bent))
     kernel, pull = kernel_weights(distance, spacing, height, _BLEND)
     patch = surface.patches.excess(sample, lateral, spacing)
     return Nearby(sample, distance, spacing, room, offset, normals, bend, height, above, kernel, pull, *patch)
+
+
+def _bent(bend, lateral):
+    """How far normals turn along steps (3,m,k), by the second fundamental form (6,m,k) there, (3,m,k)."""
+    xx, yy, zz, xy, xz, yz = bend
+    return np.stack([dots(row, lateral) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))])
 
 
 def _onto_sheet(surface, near, anchor):
@@ -215,11 +220,15 @@ def _onto_sheet(surface, near, anchor):
     return projection, foot.member, np.abs(cosine) > _STRAIGHT
 
 
-def sheet_foot(near: Nearby, anchor) -> SheetFoot:
-    """Where queries fall on the sheet of their sample number `anchor` (m,)."""
+def sheet_foot(near: Nearby, anchor, level: float = 0.0) -> SheetFoot:
+    """Where queries fall on the sheet of their sample number `anchor` (m,). Samples do not belong to it whose normals
+    are turned against those of its bent patch, to a cosine below `level`."""
     every = np.arange(len(near.sample))
     between = near.offset[:, every, anchor][:, :, None] - near.offset
     member = membership(between, *_off_patches(near, anchor, between), near.room[every, anchor, None])
+    if level > 0:
+        own = near.normals[:, every, anchor, None] - _bent(near.bend[:, every, anchor, None], between)
+        member *= np.abs(dots(near.normals, own)) >= level * np.sqrt(dots(own, own))
     weight = near.kernel * member
     total = np.einsum("mk->m", weight)
     alone = np.flatnonzero(total == 0)  # so far off, in spacings, that no kernel of the sheet is above zero

@@ -19,6 +19,7 @@ _COVERED = 0.5  # cells, a crossing this far past the rim of its sheet is on it
 _CUTS = 1.0  # cells, past the rim of a sheet that ends others
 _ACROSS = 0.8  # largest |n . n'| of sheets that end at each other
 _BEYOND = 0.3  # local spacings, a sheet with no samples further than this past another ends there
+_PASSING = 2  # samples of a sheet that pass through others, from which on it does
 _GAP = 2.0  # local spacings, the last samples of a sheet are this close to the one it ends at for the gap to be closed
 _STEP, _FAR = 1.5, 2.0  # local spacings and cells, places in such a gap are this close to the sheet beyond it
 _STRAIGHT = 0.7  # cosine between the way out of the sheet and the way to the other
@@ -60,7 +61,7 @@ def meeting_edges(
     found = [found for _, found in in_order(lambda axis: _along(axis, ahead[axis], sheets, x, cell, hair), range(3))]
     axis = np.repeat(np.arange(3), [len(part[0]) for part in found])
     one, place, normal, crossed, certainty, beyond, near = (np.concatenate(part) for part in zip(*found, strict=True))
-    kept = _reaches(place, normal, beyond, sheets, near, surface, len(row), cell, hair)
+    kept = _reaches(place, normal, beyond, sheets, near, surface, meet.through, len(row), cell, hair)
     edge = 3 * row[one[kept]] + axis[kept]
     zone = np.concatenate([3 * row[ahead[a] >= 0] + a for a in range(3)])
     return MeetingEdges(edge, place[kept], normal[kept], crossed[kept], certainty[kept], zone)
@@ -102,11 +103,13 @@ def _least(key, cost):
     return chosen
 
 
-def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell, hair):
+def _reaches(place, normal, beyond, sheets: Sheets, near, surface, through, nodes, cell, hair):
     """Whether the sheet of each candidate gets there: within its rim and not past another sheet at which it ends, or
-    in the gap between its last samples and such a sheet; on which side of that, `hair` decides as for nodes."""
+    in the gap between its last samples and such a sheet; on which side of that, `hair` decides as for nodes. A sheet
+    with samples that pass `through` others, (n,) bool, ends at none."""
     first, count = sheets.span(nodes)
     covered, cut = beyond <= _COVERED * cell, np.zeros(len(place), bool)
+    passes = (sheets.member & through[sheets.sample]).sum(axis=1) >= _PASSING
     for i in range(count.max(initial=0)):
         other = first[sheets.node[near]] + i
         row = np.flatnonzero((count[sheets.node[near]] > i) & (other != near))
@@ -120,7 +123,7 @@ def _reaches(place, normal, beyond, sheets: Sheets, near, surface, nodes, cell, 
         member = sheets.member[own]
         spacing = surface.spacing[sheets.sample[own, sheets.anchor[own]]]
         this_side = np.where(member, heights, -np.inf).max(axis=1) >= _BEYOND * spacing
-        cut[row[~this_side]] = True
+        cut[row[~this_side & ~passes[own]]] = True
         gap = np.where(member, np.abs(heights), np.inf).min(axis=1)
         out = sheets.outward[own]
         straight = -up * row_dots(out, axis) > _STRAIGHT * np.linalg.norm(out, axis=1)

@@ -2,7 +2,8 @@
 
 A crease or a tight bend looks like two sheets to a few samples, too. Two samples lie on different sheets where neither
 is on the other's tangent plane, where no sample between them lies on one sheet with both, and where their
-sheets either run side by side or one goes on past the other's plane; where many pairs of a neighbourhood do.
+sheets either run side by side or one goes on past the other's plane; or where there is a third sheet between whose two
+sides they lie, while each of theirs parts the others, too; where many pairs of a neighbourhood do.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from ...field.local_surface import LocalSurface
 from ...field.projection import MEMBER, TRUSTED, membership
-from ...linalg import dots, row_dots
+from ...linalg import cross, dots, row_dots
 from ...lookup import numbered
 from ...parallel import even_chunks, in_order, over_rows
 from ...parts import connected_parts
@@ -25,6 +26,9 @@ _ASKEW = float(np.sqrt(1 - SIDE_BY_SIDE**2))  # least sine between others
 _WIDER, _CLOSE = 120, 60  # samples among which a sheet is followed, and close by where it meets another squarely
 _STRAIGHT, _FAR = 0.5, 4.0  # least membership of those it is followed over; local spacings, up to where
 _PAST = 1.0  # local spacings along itself that a sheet goes on, on either side of the other
+_PARTED = 0.3  # local spacings, off the plane of one of three sheets that end at a line, samples of the others
+_THIRD = 4  # samples of the third, at least
+_LEVEL = 0.3  # volume that the normals of such sheets span, at most
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
 _WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
@@ -98,6 +102,8 @@ def find_meetings(surface: LocalSurface, progress=None, by_room: bool = False) -
     askew = np.flatnonzero(apart & (cosine <= SIDE_BY_SIDE))
     past, close = _goes_past(i[askew], j[askew], surface)
     apart[askew] = past > 0
+    rest = np.flatnonzero(~apart & (cosine <= SIDE_BY_SIDE))
+    apart[rest] = _in_threes(i[rest], j[rest], nearest, unlike, surface)
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
     at = _grown(*((found >= _LEAST) & (found >= share * pairs) for share in (_SHARE, _WEAK)), nearest)
     through = _among(n, i[askew][close == 2], j[askew][close == 2])
@@ -177,6 +183,27 @@ def _goes_past(i, j, surface):
 
     over_rows(look, len(pair), _CHUNK)
     return past[:, number]
+
+
+def _in_threes(i, j, nearest, unlike, surface):
+    """Whether samples i and j lie on two of three sheets that end at one line, (m,): the plane of each parts the other
+    two, as at no crease and no corner of three faces. Of the third some samples are among those nearest to i."""
+    found, columns = np.empty(len(i), bool), (surface.columns.points, surface.normals.T)
+
+    def look(part):
+        samples = i[part, None], j[part, None], nearest[i[part]]
+        (p, q, r), (n, o, m) = ([np.stack([x.take(some) for x in of]) for some in samples] for of in columns)
+        sides = (
+            dots(q - p, n) * dots(r - p, n),
+            dots(p - q, o) * dots(r - q, o),
+            dots(p - r, m) * dots(q - r, m),
+        )
+        limit = (_PARTED * surface.spacing[i[part], None]) ** 2
+        third = unlike[i[part]] & (np.max(sides, axis=0) < -limit) & (np.abs(dots(cross(n, o), m)) < _LEVEL)
+        found[part] = third.sum(axis=1) >= _THIRD
+
+    over_rows(look, len(i), _CHUNK)
+    return found
 
 
 def _followed(own, surface):

@@ -18,12 +18,13 @@ from ...progress import Progress
 from ...records import joined, picked
 
 _NEAREST = 16  # samples of a node
-_SHEETS = 3  # of a node, at first
+_SHEETS = 6  # of a node, at first
 REACH = 1.6  # cells, from a node to a sheet that counts
 SIDE_BY_SIDE = 0.9  # least |n . n'| of sheets that run side by side
 _LIKELY = 0.6  # least confidence of samples of such sheets beside the first
 _SAME_ANGLE, _SAME_FOOT = 0.9, (0.25, 0.1)  # cosine; cells or local spacings, whichever is more
 STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
+_LEVEL = 0.86  # least cosine between the normals of a sheet near a node and of samples on it
 ALIKE = 0.6  # least cosine between the axes of one sheet at neighbouring nodes
 _BENT, _OFF = 0.35, 0.1  # its feet are off each other's plane by this share of their distance and this many cells
 
@@ -109,7 +110,7 @@ def _sheets_of(surface, x, part, cell):
 
 
 def _on_sheet(node, x, near, anchor):
-    foot = sheet_foot(near, anchor)
+    foot = sheet_foot(near, anchor, _LEVEL)
     place = x - foot.tau[:, None] * foot.axis
     member, sample = foot.member > MEMBER, near.sample.astype(np.int32)
     return Sheets(node, foot.tau, foot.axis, foot.beyond, foot.outward, member, place, sample, anchor)

@@ -1,7 +1,9 @@
 """Which crossings of a cell share a vertex.
 
-Sheets that cross or end at each other share the vertices of the cells where they do. Sheets that run side by side
-within a cell have one each, also where one of them ends.
+Sheets that cross or end at each other share the vertices of the cells where they do. Which these are, the faces of the
+grid tell, alike to the cells on both sides: two sheets cross on a face where they pass its edges in turns. So the cells
+follow each other along the line, and sheets share no vertex off it, which would make handles. Sheets that run side by
+side within a cell have one each, also where one of them ends.
 """
 
 import numpy as np
@@ -36,12 +38,15 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
             a, b = order[first[row] + i], order[first[row] + j]
             same, meet = _compare(crossings, owner[a], owner[b], grid.spacing)
             steep[row[meet]] = True
-            links.append((a[same | meet], b[same | meet]))
-    vertex = connected_parts(*(np.concatenate(ends) for ends in zip(*links, strict=True)), len(corner))
+            links.append((a[same], b[same]))
+    sheet = connected_parts(*(np.concatenate(ends) for ends in zip(*links, strict=True)), len(corner))
 
+    at = np.flatnonzero(steep[corner])
+    face, turn = _on_faces(owner[at], cell[corner[at]], crossings, grid)
+    one, other, ended = _lines(sheet[at], corner[at], face, turn, owner[at])
+    vertex = connected_parts(one, other, len(corner))[sheet]
     open_cell = np.zeros(len(cell), bool)
-    open_cell[corner[_at_end(vertex, corner, cell, crossings, owner, grid)]] = True
-    open_cell &= steep
+    open_cell[corner[np.isin(sheet, ended, kind="table")]] = True
     leader = np.full(len(cell), len(corner))
     np.minimum.at(leader, corner, vertex)
     vertex = np.where(open_cell[corner], leader[corner], vertex)
@@ -68,13 +73,38 @@ def _compare(crossings, a, b, cell):
     return (off <= _BENT * length + _OFF * cell) & ~meet, meet
 
 
-def _at_end(vertex, corner, cell, crossings, owner, grid):
-    """Whether each corner's sheet ends in its cell: it crosses an odd number of the edges of a face of the cell."""
-    strides = node_strides(grid.shape)
-    offset = crossings.node[owner] - cell[corner]
+def _on_faces(owner, cell, crossings, grid):
+    """The two faces of its cell that each crossing lies on, (2,m) int, and how far around each it does, (2,m) in [0,4]:
+    the same seen from both cells at a face."""
+    axis, strides = crossings.axis[owner], node_strides(grid.shape)
+    offset = crossings.node[owner] - cell
     side = np.stack([offset // strides[0], offset % strides[0] // strides[1], offset % strides[1]], axis=1)
-    count = np.zeros((vertex.max(initial=-1) + 1, 6), np.int64)
-    for turn in (1, 2):
-        across = (crossings.axis[owner] + turn) % 3
-        np.add.at(count, (vertex, 2 * across + side[np.arange(len(owner)), across]), 1)
-    return (count % 2).any(axis=1)[vertex]
+    row = np.arange(len(owner))
+    along = crossings.place[owner] - grid.positions(crossings.node[owner])
+    share = np.clip(along[row, axis] / grid.spacing, 0, 1)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    face = np.stack([2 * first + side[row, first], 2 * second + side[row, second]])
+    turn = [np.where(side[row, second] > 0, 1 + share, 4 - share), np.where(side[row, first] > 0, 3 - share, share)]
+    return face, np.stack(turn)
+
+
+def _lines(sheet, corner, face, turn, owner):
+    """Pairs of sheets of one cell that cross on a face of it, (p,) each: both pass two of its edges, in turns; and the
+    sheets that end in their cell, (q,), which pass an odd number of the edges of a face."""
+    sheet, owner, face, turn = np.tile(sheet, 2), np.tile(owner, 2), (6 * corner + face).reshape(-1), turn.reshape(-1)
+    order = np.lexsort([owner, turn, face])
+    sheet, face = sheet[order], face[order]
+    key, group = numbered(face * (sheet.max(initial=0) + 1) + sheet)
+    count, place = np.bincount(group, minlength=len(key)), np.arange(len(group))
+    start, stop = np.full(len(key), len(group)), np.zeros(len(key), np.int64)
+    np.minimum.at(start, group, place)
+    np.maximum.at(stop, group, place)
+    ended, two = sheet[stop[count % 2 == 1]], count == 2
+    start, stop = start[two], stop[two]
+    pairs, step = [np.empty((2, 0), np.int64)], 1
+    while (near := np.flatnonzero(face[start[step:]] == face[start[:-step]])).size:
+        a, b = near, near + step
+        begins, ends = ((start[a] < x[b]) & (x[b] < stop[a]) for x in (start, stop))
+        pairs.append(sheet[np.stack([start[a], start[b]])[:, begins != ends]])
+        step += 1
+    return *np.concatenate(pairs, axis=1), ended

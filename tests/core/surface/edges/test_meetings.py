@@ -88,6 +88,21 @@ def test_a_sheet_goes_past_another_where_it_has_samples_on_both_sides(turned):
     assert not (meet.beside | meet.passing).any()
 
 
+def test_three_sheets_that_end_at_one_line_meet_there():
+    """Any two of them are a crease."""
+    flat, normals, points = shapes.square(1200, side=1.0) + np.array([0.51, 0, 0]), [], []
+    for angle in np.radians([0, 120, 240]):
+        c, s = np.cos(angle), np.sin(angle)
+        points.append(flat[:, :1] * [c, 0, s] + flat[:, 1:2] * [0, 1, 0])
+        normals.append(np.repeat([[s, 0, -c]], len(flat), axis=0))
+    for count, meet in ((2, False), (3, True)):
+        surface = fitted(np.concatenate(points[:count]), np.concatenate(normals[:count]))
+        away = np.hypot(surface.points[:, 0], surface.points[:, 2]) / np.median(surface.spacing)
+        found = find_meetings(surface).at
+        assert (found[(away < 1.5) & (np.abs(surface.points[:, 1]) < 0.4)] == meet).all()
+        assert not found[away > 9].any()
+
+
 def test_crossing_squares_meet_along_their_line_only():
     surface = crossed()
     away = np.hypot(surface.points[:, 0], surface.points[:, 2]) / np.median(surface.spacing)

@@ -166,6 +166,25 @@ def test_sheets_that_meet_at_random_samples_are_one_surface_without_pockets(name
     assert len(shapes.components(sheet)) == 1
 
 
+def fan(angles, both, seed):
+    """Half squares that end at the y axis at some angles, or squares that pass through it, turned."""
+    flat = shapes.square(1000)
+    across, along = flat[:, :1] if both else 0.5 * (flat[:, :1] + 1.02), flat[:, 1:2]
+    sheets = [across * [np.cos(a), 0, np.sin(a)] + (along + 1e-3 * a) * [0, 1, 0] for a in np.radians(angles)]
+    return np.concatenate(sheets) @ shapes.random_rotation(seed).T
+
+
+@pytest.mark.parametrize(
+    ("angles", "both", "seed"), [((0, 120, 240), False, 1), ((0, 120, 240), False, 3), ((0, 45), True, 1)]
+)
+def test_sheets_that_meet_askew_have_no_tunnels_along_their_line(angles, both, seed):
+    """Three that end at one line, of which none goes on past another, or two that cross at half a right angle. They
+    shrink to a point, so their Euler characteristic is 1, that of what is around them 2."""
+    run = single(fan(angles, both, seed), resolution=64, surface="both", denoise=0)
+    assert shapes.euler(run.sheet) == 1
+    assert shapes.euler(run.surface) == 2
+
+
 @pytest.mark.parametrize(("bridge", "loops"), [(3.0, 2), (8.0, 1)])
 def test_a_hole_narrower_than_bridge_closes_and_a_wider_one_stays_open(bridge, loops):
     points = shapes.holed_square(1000, radius=0.16)
