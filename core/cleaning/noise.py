@@ -8,6 +8,7 @@ from ..normals.reflection import reflection_sweeps
 from ..progress import Progress
 from ..voronoi.facets import voronoi_facets
 from .anchors import SMOOTHING, nearest_anchor, some_samples
+from .averaged import cells_of_means
 from .flat_patches import shows_flat_patches
 from .roughness import least_part, roughness
 from .thin_walls import is_shift, two_sheets
@@ -60,21 +61,23 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
             amid = suspect & beside.all(axis=1)
             amid = found.anchors[amid if amid.any() else suspect]
             suspect = beside.any(axis=1)  # noise left beside would stand out as a seam
-            if voxels is not None or not _seems_only(points, spacing, found.anchors[suspect], amid, level, part):
+            if voxels is not None or not _seems_only(points, spacing, found.anchors[suspect], amid, level, seed, part):
                 break
     else:
         return clean
     return suspect[nearest_anchor(points, points[found.anchors], progress.part(0.9, 1.0))]
 
 
-def _seems_only(points, spacing, anchors, amid, level, progress):
+def _seems_only(points, spacing, anchors, amid, level, seed, progress):
     """Whether samples that seem to have noise of `level` local spacings at some anchors are free of it: those of thin
-    walls, or on flat faces, and not of two scans that are shifted against each other. Flat faces are asked for `amid`
-    these alone: beside noise a smooth surface looks flat."""
+    walls, or on flat faces, and not of two scans that are shifted against each other, nor means of cells as wide as
+    the sheets are apart. Flat faces are asked for `amid` these alone: beside noise a smooth surface looks flat."""
     sheets = two_sheets(points, spacing, anchors, level, progress)
-    if sheets is not None:
-        return not is_shift(*sheets)
-    return shows_flat_patches(points, spacing, amid, level)
+    if sheets is None:
+        return shows_flat_patches(points, spacing, amid, level)
+    half, normal = sheets
+    cell = cells_of_means(points, spacing, seed)
+    return (cell is None or np.median(half) > 0.5 * cell) and not is_shift(half, normal)
 
 
 def _noisy_anchors(points, spacing, found, voxels, seed, progress):

@@ -1,0 +1,74 @@
+"""Means of points: a scan thinned to one sample in each cell of a grid, the mean of those that lay in it.
+
+Where cells part noise of a surface that runs along them, its means lie in two sharp layers, as samples of a thin wall
+do; what is nearer than a cell to another sheet cannot be told from that.
+"""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ..trees import k_nearest
+from .anchors import some_samples
+
+_LOOKED_AT, _NEAREST = 3000, 8  # samples, and the nearest to each, that are in other cells
+_SIDES = 0.6, 1.6  # local spacings: cells of one sample have sides of about one
+_PER_TURN = 4  # frequencies looked at, for each by which waves over the whole cloud differ by one
+_FINER = np.linspace(-1, 1, 81)  # of the step between frequencies
+_WAVES = 256  # looked at together
+_ROUNDS = 5
+_ASIDE = np.linspace(-0.5, 0.5, 33)  # sides, that the cells are moved along each axis
+_TOGETHER, _SHIFTED = 0.02, 0.04  # of pairs in one cell at most, and at least where cells are half of one aside
+
+
+def cells_of_means(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> float | None:
+    """The side of the cells along the axes that samples (n,3) with local spacing (n,) are one each of, in the units of
+    both; None where there are none.
+
+    Means keep away from the walls of their cells, so their coordinates have a wave along all three axes; cells of that
+    length are placed where the fewest neighbours share one. Of means hardly any do there, and many half a cell aside;
+    scattered samples do in both places, those of a lattice, which :mod:`.voxels` finds, in neither.
+    """
+    rows = some_samples(points, min(_LOOKED_AT, len(points)), seed)
+    here = points[rows]
+    step = 1.0 / (_PER_TURN * np.ptp(points, axis=0).max())
+    frequency, phase = _wave(here, np.median(spacing), step)
+    near = points[k_nearest(KDTree(points), here, _NEAREST + 1)[1][:, 1:]]
+
+    def together(cells):
+        """Share of the pairs of neighbours that are in one of cells of a side with a corner at an origin."""
+        side, origin = cells
+        cell, others = np.floor((here - origin) / side), np.floor((near - origin) / side)
+        return (cell[:, None] == others).all(axis=2).mean()
+
+    middle = here.mean(axis=0)
+    side = 1.0 / frequency
+    cells = side, side * (phase - 0.5 + np.rint(middle / side))
+    for _ in range(_ROUNDS):
+        for axis in np.eye(3):
+            cells = min([cells, *((cells[0], cells[1] + aside * cells[0] * axis) for aside in _ASIDE)], key=together)
+        longer = [1.0 / (1.0 / cells[0] + step * finer) for finer in _FINER]
+        cells = min([cells, *((side, middle + (cells[1] - middle) * side / cells[0]) for side in longer)], key=together)
+    side, origin = cells
+    found = together((side, origin)) < _TOGETHER and together((side, origin + 0.5 * side)) > _SHIFTED
+    return side if found else None
+
+
+def _wave(points, spacing, step):
+    """The frequency at which points (m,3) have the strongest wave along all three axes, and its phases (3,), turns."""
+    least, most = (1.0 / (side * spacing) for side in _SIDES[::-1])
+    frequencies = np.arange(least, most, step)
+    best = frequencies[np.abs(_waves(points, frequencies)).min(axis=0).argmax()]
+    finer = best + step * _FINER
+    waves = _waves(points, finer)
+    best = np.abs(waves).prod(axis=0).argmax()
+    return finer[best], np.angle(waves[:, best]) / (2 * np.pi)
+
+
+def _waves(points, frequencies):
+    """Mean phasors of the coordinates of points (m,3) at each frequency (k,), (3,k) complex."""
+    found = np.empty((3, len(frequencies)), complex)
+    for first in range(0, len(frequencies), _WAVES):
+        some = slice(first, first + _WAVES)
+        for axis, x in enumerate(points.T):
+            found[axis, some] = np.exp(2j * np.pi * np.outer(frequencies[some], x)).mean(axis=1)
+    return found
