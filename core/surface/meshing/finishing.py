@@ -22,7 +22,7 @@ def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float
     others, see :func:`untangled`; what these leave blunt is made sharp once more, where none do then."""
     sharp = sharpened(mesh, passing, surface, cell, progress.part(0.0, 0.6))
     mesh = centred(unfolded(sharp, surface, cell, held=(sharp.vertices != mesh.vertices).any(axis=1)))
-    loose = untangled(mesh, surface)
+    loose = untangled(mesh, surface, ~_passing(mesh.vertices, passing, surface))
     moved = (loose.vertices != mesh.vertices).any(axis=1)
     if not moved.any():
         return mesh
@@ -40,7 +40,7 @@ def sharpened(
     passing : (n,) bool, the samples close to such lines     among : (v,) bool, vertices that may move, or True for all
     """
     ways = (1.0, -1.0, -1.0) if passing.any() else (1.0, -1.0)
-    farthest = _farthest(mesh.vertices, passing, surface)
+    farthest = np.where(_passing(mesh.vertices, passing, surface), _INTO_LINES, _INTO)
     for outward, part in progress.turns(ways):
         vertices, (normal, least) = mesh.vertices, mesh.normals
         row, side = np.flatnonzero(mesh.vertices_of(mesh.faces_at(least < FLAT)) & among), np.zeros_like(vertices)
@@ -57,8 +57,8 @@ def sharpened(
     return mesh
 
 
-def _farthest(vertices, passing, surface):
-    """How many cells each vertex may go into a crease, (v,), or where no sheets pass through one another, all."""
+def _passing(vertices, passing, surface):
+    """Which vertices (v,3) are nearest to one of the samples `passing`, (v,) bool."""
     if not passing.any():
-        return _INTO
-    return np.where(passing[surface.tree.query(vertices, workers=-1)[1]], _INTO_LINES, _INTO)
+        return np.zeros(len(vertices), bool)
+    return passing[surface.tree.query(vertices, workers=-1)[1]]

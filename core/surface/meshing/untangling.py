@@ -21,14 +21,16 @@ _SMALL = 0.98  # share of the faces, above whose size others are looked for apar
 _AT_ONCE = 1 << 13  # faces
 
 
-def untangled(mesh: Mesh, surface: LocalSurface) -> Mesh:
+def untangled(mesh: Mesh, surface: LocalSurface, among=True) -> Mesh:
     """The mesh with vertices of faces that pass through others moved towards the middle of their neighbours (Laplacian
     smoothing), a little further each time, until no two of them do, and from there onto the surface if none do then.
 
     Vertices at borders stay, those of lines of more than two faces move along these; where faces still cross at last,
     as sheets do that pass through each other, all is left as it was.
+
+    among : (v,) bool, vertices next to which such faces are looked for, or True for all
     """
-    loose = _without_crossings(mesh, mesh.vertices, mesh.normals[1] < _BENT, smoothed)
+    loose = _without_crossings(mesh, mesh.vertices, (mesh.normals[1] < _BENT) & among, smoothed)
     row = np.flatnonzero((loose.vertices != mesh.vertices).any(axis=1))
     if not len(row):
         return mesh

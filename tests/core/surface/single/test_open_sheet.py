@@ -77,7 +77,7 @@ def test_a_creased_scan_is_wound_alike():
     assert away.max() < 3  # behind the ears, in slits narrower than two cells
 
 
-@pytest.mark.parametrize(("degrees", "seed"), [(70, 3), (56, 1), (56, 10), (45, 1), (45, 3), (40, 1)])
+@pytest.mark.parametrize(("degrees", "seed"), [(70, 3), (56, 1), (56, 10), (45, 1), (45, 2), (40, 1)])
 def test_sheets_that_pass_through_each_other_askew_meet_in_a_line(degrees, seed):
     """Two squares. At 40 degrees walls of up to two cells stood between them beside the line, with 20 tunnels and more;
     at 56 they turned off there."""
@@ -93,7 +93,7 @@ def test_sheets_that_pass_through_each_other_askew_meet_in_a_line(degrees, seed)
     line = run.sheet.vertices[np.unique(edges[count > 2])] @ turn / run.field.spacing
     assert np.hypot(line[:, 0], line[:, 2]).max() < 1
     assert np.histogram(line[:, 1], np.linspace(-40, 40, 21))[0].all()
-    assert -8 <= shapes.euler(run.sheet) <= 1
+    assert -4 <= shapes.euler(run.sheet) <= 1
     middle = run.sheet.vertices[run.sheet.faces].mean(axis=1) @ turn / run.field.spacing
     off = np.minimum(np.abs(middle[:, 2]), np.abs(middle @ [s, 0, -c]))
     assert np.percentile(off, 99.9) < 0.3
