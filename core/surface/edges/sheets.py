@@ -24,7 +24,7 @@ SIDE_BY_SIDE = 0.9  # least |n . n'| of sheets that run side by side
 _LIKELY = 0.6  # least confidence of samples of such sheets beside the first
 _SAME_ANGLE, _SAME_FOOT = 0.9, (0.25, 0.1)  # cosine; cells or local spacings, whichever is more
 STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
-_LEVEL = 0.84  # least cosine between the normals of a sheet near a node and of samples on it
+_LEVEL = 0.83  # least cosine between the normals of a sheet near a node and of samples on it
 ALIKE = 0.6  # least cosine between the axes of one sheet at neighbouring nodes
 _BENT, _OFF = 0.35, 0.1  # its feet are off each other's plane by this share of their distance and this many cells
 
