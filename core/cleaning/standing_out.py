@@ -22,10 +22,7 @@ def proud(around: Surroundings) -> np.ndarray:
     """(n,) bool: which samples are a little lonely and off their neighbours' plane, where none of these is."""
     lonely, off, over_theirs = _PROUD
     found = (around.lonely > lonely) & (around.off > off) & ~around.wire
-    found = _standing_out(around, found, around.off, over_theirs)
-    row = np.flatnonzero(found)
-    found[row] = ~_in_sheet(around, row)
-    return found
+    return _in_no_sheet(around, _standing_out(around, found, around.off, over_theirs))
 
 
 def hovering(around: Surroundings, progress: Progress) -> np.ndarray:
@@ -37,8 +34,7 @@ def hovering(around: Surroundings, progress: Progress) -> np.ndarray:
     height = fit_quadrics(points, np.arange(len(points)), _FITTED, progress.part(0.0, 0.6)).left_out()
     higher = (around.off > _FAR) & (height > _FAR * around.spacing)
     suspect = (_standing_out(around, higher, height, 1.0) | (around.lonely > _SUSPECT)) & ~around.wire
-    row = np.flatnonzero(suspect)
-    suspect[row] = ~_in_sheet(around, row)
+    suspect = _in_no_sheet(around, suspect)
     row, rest = np.flatnonzero(suspect), np.flatnonzero(~suspect)
     if not len(row) or len(rest) < _FEWEST:
         return np.zeros(len(points), bool)
@@ -70,12 +66,14 @@ def _standing_out(around, found, height, times):
     return found
 
 
-def _in_sheet(around, row):
-    """Which of samples `row` (m,) lie in a sheet of their own close beside another one: samples around are at their
-    height above the flattest neighbourhood near them."""
+def _in_no_sheet(around, found):
+    """Which of the samples `found` lie in no sheet of their own close beside another one: in one, samples around are at
+    their height above the flattest neighbourhood near them."""
     count, fewest, off = _AT_ITS_HEIGHT
+    row = np.flatnonzero(found)
     points, near = around.points, around.neighbours[row, 1:]
     flattest = near[np.arange(len(row)), around.thickness[near].argmin(axis=1)]
     others = around.tree.query(points[row], k=range(2, min(count, len(points)) + 1))[1]
     height = np.einsum("mki,mi->mk", points[others] - points[row, None], around.across[flattest])
-    return (np.abs(height) < off * around.spacing[flattest, None]).sum(axis=1) >= fewest
+    found[row] = (np.abs(height) < off * around.spacing[flattest, None]).sum(axis=1) < fewest
+    return found

@@ -91,7 +91,7 @@ def fit_quadrics(points, rows, neighbours: int, progress=None, clusters: Cluster
 
 
 def quadrics_at(points, places, neighbours: int, progress=None) -> Quadrics:
-    """The same at places (m,3) that are none of the points, which have no part in them: none has leverage."""
+    """The same at places (m,3) that are none of the points: heights are as they are, not to be :meth:`left_out`."""
     (found,) = _through(points, places, (neighbours,), _quadrics, progress)
     return found
 
