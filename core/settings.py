@@ -142,8 +142,8 @@ class Settings:
     )
     outliers: bool = _option(
         True,
-        "Drop stray points far from any surface, and the few that lie further from all others than these from each "
-        "other, before anything else; how many is in the report",
+        "Drop stray points far from any surface, the few that lie further from all others than these from each other, "
+        "and those inside a solid that points fill, before anything else; how many is in the report",
     )
     denoise: float | str = _option(
         "auto",

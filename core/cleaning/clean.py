@@ -6,6 +6,7 @@ from ..points import Samples, local_spacing
 from ..progress import Progress
 from ..settings import Settings
 from .depth_steps import between_steps
+from .filled import bounds_volume, fills_volume
 from .outliers import find_outliers
 from .positions import denoise
 from .voxels import find_voxels
@@ -30,10 +31,18 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
     if dropped.any():
         samples = samples.without(dropped, _said_of_dropped(dropped, samples.points))
     spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
-    moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 1.0))
+    moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 0.7))
+    filled = even = False
+    if done and "voxel" not in done:
+        filled, even = fills_volume(samples.points, done["neighbours"][1], settings.seed)
+    if filled and even and settings.outliers:
+        inside = ~bounds_volume(samples.points, spacing, settings.seed, progress.part(0.7, 0.75))
+        samples, filled = samples.without(inside, _said_of_inside(inside, "a volume that they fill")), False
+        spacing = local_spacing(samples.points)
+        moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.75, 1.0))
     if done:
         done |= {name: done[name] * samples.scale for name in ("noise", "mean_move", "voxel") if name in done}
-        samples = samples.moved(moved, *([_said_of_voxels(done["voxel"])] if "voxel" in done else []))
+        samples = samples.moved(moved, *_said_of_moved(done, filled, settings.denoise))
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
 
 
@@ -52,15 +61,33 @@ def _boundary_of_solid(samples, seed):
     voxels = find_voxels(samples.points, seed) if len(samples.points) > 1 else None
     if voxels is None or (inside := voxels.inside()).mean() < _SOLID:
         return samples
-    said = f"{inside.sum()} of {len(inside)} points lie inside a solid of voxels: its boundary alone is taken"
-    return samples.without(inside, f"{said}; with outliers=False they stay")
+    return samples.without(inside, _said_of_inside(inside, "a solid of voxels"))
 
 
-def _said_of_voxels(side):
+def _said_of_inside(inside, solid):
     return (
-        f"points are in steps of {side:.2g}, as voxels and whole heights are: they were moved off these; with "
-        "denoise=0 they stay"
+        f"{inside.sum()} of {len(inside)} points lie inside {solid}: its boundary alone is taken; with outliers=False "
+        "they stay"
     )
+
+
+def _said_of_moved(done, filled, strength):
+    """What to warn of where points were moved: a surface that is a guess, and moves that nobody asked for."""
+    if "voxel" in done:
+        yield (
+            f"points are in steps of {done['voxel']:.2g}, as voxels and whole heights are: they were moved off these; "
+            "with denoise=0 they stay"
+        )
+    elif filled:
+        yield (
+            "points fill a volume: the surface through them is a guess; give those of its boundary alone, or make a "
+            "volume of the points"
+        )
+    elif strength == "auto":
+        yield (
+            f"{done['noisy']} points look noisy: they were moved by {done['mean_move']:.2g} on average; with denoise=0 "
+            "they stay"
+        )
 
 
 def _off_steps_of_depth(samples, strength, progress):
