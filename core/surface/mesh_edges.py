@@ -55,6 +55,13 @@ class Edges:
         upwards = self.faces < np.roll(self.faces, -1, axis=1)
         return np.bincount(self.number.reshape(-1), upwards.reshape(-1))[self.count == 2] == 1
 
+    def corners_at_ends(self, corner: np.ndarray) -> np.ndarray:
+        """The corners at the lower and the higher end of the edges of triangles from corners (m,), numbered three to a
+        face, to the next ones, (2,m)."""
+        vertex, after = self.faces.reshape(-1), corner_after(corner)
+        upwards = vertex[corner] < vertex[after]
+        return np.stack([np.where(upwards, corner, after), np.where(upwards, after, corner)])
+
     def ends_at(self, chosen: np.ndarray) -> np.ndarray:
         """How many edges of those `chosen`, (e,) bool or rows, each vertex has, (n,) int."""
         return np.bincount(np.append(self.low[chosen], self.high[chosen]), minlength=self.n)
@@ -76,6 +83,11 @@ class Edges:
         tail, head = self.faces.reshape(-1), np.roll(self.faces, -1, axis=1).reshape(-1)
         ends = np.minimum(tail, head), np.maximum(tail, head)
         return coo_matrix((np.ones(len(tail), np.int32), ends), shape=(self.n, self.n)).tocsr()
+
+
+def corner_after(corner: np.ndarray) -> np.ndarray:
+    """The next corner of the same triangle, for corners (m,) numbered three to a face."""
+    return np.where(corner % 3 == 2, corner - 2, corner + 1)
 
 
 def _looked_up(table: csr_matrix, tail, head):

@@ -1,14 +1,15 @@
 """In which order faces follow each other around edges of three and more.
 
 The angles of single faces tell it, but faces are often folded where lines turn, and a sheet would pass to the other
-side of the next one there. The order of three sheets stays the same along a line, so all its edges tell it together.
+side of the next one there. So the orders around all the edges of a vertex tell it together.
 """
 
 import numpy as np
 
 from ...linalg import cross, dots, lengths, symmetric
-from ...parts import connected_parts
 from ..mesh import Mesh
+from ..mesh_edges import corner_after
+from .around_vertices import as_around_vertices
 
 
 def order_around(sheet: Mesh) -> np.ndarray:
@@ -25,46 +26,9 @@ def order_around(sheet: Mesh) -> np.ndarray:
     angle = _angles(sheet, np.minimum(here, next_), np.maximum(here, next_), third)
     sorted_ = np.lexsort((angle, on))
     order[line], angle = order[line][sorted_], angle[sorted_]
-    three = line[several[line] == 3].reshape(-1, 3)
-    order[three] = _as_along_lines(sheet, order[three], angle[several[line] == 3].reshape(-1, 3))
-    return order
-
-
-def corner_after(corner: np.ndarray) -> np.ndarray:
-    """The next corner of the same triangle, for corners (m,) numbered three to a face."""
-    return np.where(corner % 3 == 2, corner - 2, corner + 1)
-
-
-def _as_along_lines(sheet, order, angle):
-    """The corners (e,3) of edges of three faces, in the order that most edges of the same line have, by how far apart
-    their angles (e,3) are, between the same three strips. Since strips are wound alike, one of them tells which way the
-    line goes, and another that is there twice goes along the line both ways."""
-    corner = sheet.faces.reshape(-1)
-    tail, head = corner[order], corner[corner_after(order)]
-    strip = _strips(sheet)[order // 3]
-    alone = (strip != np.roll(strip, 1, axis=1)) & (strip != np.roll(strip, -1, axis=1))
-    turned = (np.where(alone, strip, len(sheet.faces)).argmin(axis=1)[:, None] + np.arange(3)) % 3
-    order, strip, upwards = (np.take_along_axis(x, turned, axis=1) for x in (order, strip, tail < head))
-    name = 2 * strip + (upwards == upwards[:, :1])
-    told = np.flatnonzero(alone.any(axis=1) & (name[:, 1] != name[:, 2]))
-    if not len(told):
-        return order
-    names = np.column_stack([name[told, 0], np.sort(name[told, 1:], axis=1)])
-    group = np.unique(names, axis=0, return_inverse=True)[1].reshape(-1)
-    turn = np.where(upwards[told, 0] == (name[told, 1] < name[told, 2]), 1, -1)
-    apart = np.diff(np.column_stack([angle[told], angle[told, 0] + 2 * np.pi]), axis=1).min(axis=1)
-    wrong = told[np.bincount(group, turn * apart)[group] * turn < 0]
-    order[wrong] = order[wrong][:, [0, 2, 1]]
-    return order
-
-
-def _strips(sheet):
-    """The number of the strip beside a line that each face is in, (f,): faces follow each other there around vertices
-    where the line goes on, and are wound alike. At its ends the strips on its sides would be one."""
-    edges = sheet.edges
-    goes_on = edges.ends_at(edges.count > 2) == 2
-    linked = edges.alike & (goes_on[edges.low] | goes_on[edges.high])[edges.count == 2]
-    return connected_parts(*(face[linked] for face in edges.beside), len(sheet.faces))
+    turned = np.zeros(len(corner))
+    turned[order[line]] = angle
+    return as_around_vertices(sheet, order, turned)
 
 
 def _angles(sheet, low, high, third):

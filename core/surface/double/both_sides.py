@@ -6,7 +6,8 @@ import numpy as np
 
 from ...linalg import lengths
 from ..mesh import Mesh, at_corners, face_normals
-from .around_edges import corner_after, order_around
+from ..mesh_edges import corner_after
+from .around_edges import order_around
 from .layers import HAIR
 
 
@@ -70,7 +71,7 @@ def _sides(sheet):
     order, several = order_around(sheet), np.repeat(count, count)
     here, after = np.arange(corners), corner_after(np.arange(corners))
     upwards = corner < corner[after]
-    ends = np.stack([np.where(upwards, here, after), np.where(upwards, after, here)])
+    ends = sheet.edges.corners_at_ends(here)
     following, last = np.roll(order, -1), np.cumsum(count) - 1
     following[last] = order[last - count + 1]
     ahead, back = corners * ~upwards[order], corners * upwards[following]

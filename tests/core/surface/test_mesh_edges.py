@@ -43,6 +43,12 @@ def test_both_faces_of_an_edge_have_its_ends_and_may_be_wound_alike(faces):
         assert alike == (ways[0] != ways[1])
 
 
+def test_corners_at_ends_are_those_of_the_lower_and_the_higher_vertex(random):
+    faces = np.array([random.permutation(12)[:3] for _ in range(20)])
+    ends = faces.reshape(-1)[Edges(faces, 12).corners_at_ends(np.arange(60))]
+    np.testing.assert_array_equal(ends.T.reshape(-1, 3, 2), sides_of(faces))
+
+
 def test_ends_are_counted_at_vertices(faces):
     edges = Edges(faces, 12)
     for times in (1, 2):

@@ -243,21 +243,60 @@ def test_a_fold_beside_a_line_is_no_other_order_of_the_sheets():
     assert shapes.euler(cover) == 2
 
 
-@pytest.mark.parametrize("turned", [(), (1,), (0, 2)])
-@pytest.mark.parametrize("length", [12, 30])
-def test_a_stretch_of_folds_is_no_other_order_of_the_sheets(turned, length):
-    """A third of a line, along which faces of the first page lie beyond the second one."""
-    pages = strip(length, 1), strip(length, 1), strip(length, 1)
+def sewn(*pairs, turned=()):
+    """Strips of quads between pairs of lines, (n,3) each, that share vertices where these have the same places; some
+    wound the other way."""
     places, faces = [], []
-    for number, (page, turn) in enumerate(zip(pages, np.radians([0, 30, 180]), strict=True)):
-        along, out = page.vertices[:, 0], page.vertices[:, 1]
-        turn = np.where((number == 0) & (along > length / 3) & (along < 2 * length / 3), np.radians(50), turn)
-        places.append(np.column_stack([out * np.cos(turn), out * np.sin(turn), along]))
-        faces.append((page.faces[:, ::-1] if number in turned else page.faces) + len(page.vertices) * number)
+    for number, lines in enumerate(pairs):
+        flat = strip(len(lines[0]) - 1, 1).faces + sum(map(len, places))
+        faces.append(flat[:, ::-1] if number in turned else flat)
+        places.append(np.stack(lines, axis=1).reshape(-1, 3))
     vertices, row = np.unique(np.concatenate(places).round(9), axis=0, return_inverse=True)
-    cover = both_sides(Mesh(vertices, row.reshape(-1)[np.concatenate(faces)].astype(np.int32)), CELL)
+    faces = row.reshape(-1)[np.concatenate(faces)]
+    flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    return Mesh(vertices, faces[~flat].astype(np.int32))
+
+
+def upright(height, angle=0, away=0.0):
+    """A line along the z axis, at an angle in degrees and a distance from it that may be other ones at each height."""
+    angle = np.radians(angle)
+    return np.stack(np.broadcast_arrays(away * np.cos(angle), away * np.sin(angle), height), axis=1)
+
+
+@pytest.mark.parametrize(
+    ("pages", "turned"),
+    [
+        ([30, 180], ()),
+        ([30, 180], (1,)),
+        ([30, 180], (0, 2)),
+        ([30, 180, 270], ()),
+        ([30, 180, 270], (0, 2)),
+        ([30, 100, 180, 270], ()),
+    ],
+)
+@pytest.mark.parametrize("length", [12, 30])
+def test_a_stretch_of_folds_is_no_other_order_of_the_sheets(pages, turned, length):
+    """A third of a line, along which faces of the first page lie beyond the second one."""
+    along = np.arange(length + 1.0)
+    folded = np.where((along > length / 3) & (along < 2 * length / 3), 50, 0)
+    pairs = [(upright(along), upright(along, angle, 1.0)) for angle in [folded, *pages]]
+    cover = both_sides(sewn(*pairs, turned=turned), CELL)
     assert is_closed_manifold(cover)
     assert shapes.euler(cover) == 2
+
+
+@pytest.mark.parametrize("rows", [1, 4])
+def test_a_line_of_four_sheets_that_parts_in_two_which_change_sides_makes_no_handle(rows):
+    """The last rows of two sheets that cross, where these meet in a strip that is turned back to front."""
+    along = np.arange(13.0)
+    off = np.where(along > 12 - rows, 0.1, 0.0)
+    left, right = upright(along, 180, off), upright(along, 0, off)
+    sides = [(line, upright(along, a, 1.0)) for line, a in ((left, 45), (left, -45), (right, 135), (right, 225))]
+    sheet = sewn(*sides, (left, right))
+    assert sorted(set(sheet.edge_counts()[1])) == [1, 2, 3, 4]
+    cover = both_sides(sheet, CELL)
+    assert is_closed_manifold(cover)
+    assert shapes.euler(cover) == 2 * shapes.euler(sheet) == 2
 
 
 @pytest.mark.parametrize("seed", range(20))
