@@ -16,8 +16,8 @@ _FAR = 2.0  # times as long as the box around those kept is the one around all, 
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
-    """Samples without strays, noise, steps of depth and insides of solids of voxels, and what was done about them, in
-    input units, for the report.
+    """Samples without strays, noise, steps of depth and insides of solids, and what was done about them, in input
+    units, for the report.
 
     Clean samples come back as they are, bit for bit.
     """
@@ -30,19 +30,7 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
         dropped = np.zeros(len(samples.points), bool)
     if dropped.any():
         samples = samples.without(dropped, _said_of_dropped(dropped, samples.points))
-    spacing = local_spacing(samples.points, progress.part(0.3, 0.35))
-    moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.35, 0.7))
-    filled = even = False
-    if done and "voxel" not in done:
-        filled, even = fills_volume(samples.points, done["neighbours"][1], settings.seed)
-    if filled and even and settings.outliers:
-        inside = ~bounds_volume(samples.points, spacing, settings.seed, progress.part(0.7, 0.75))
-        samples, filled = samples.without(inside, _said_of_inside(inside, "a volume that they fill")), False
-        spacing = local_spacing(samples.points)
-        moved, done = denoise(samples.points, spacing, settings.denoise, settings.seed, progress.part(0.75, 1.0))
-    if done:
-        done |= {name: done[name] * samples.scale for name in ("noise", "mean_move", "voxel") if name in done}
-        samples = samples.moved(moved, *_said_of_moved(done, filled, settings.denoise))
+    samples, done = _off_noise(samples, settings, progress.part(0.3, 1.0))
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
 
 
@@ -71,8 +59,26 @@ def _said_of_inside(inside, solid):
     )
 
 
+def _off_noise(samples, settings, progress):
+    """The samples moved off noise, where it is, and what was done; of those that fill a volume evenly, those that bound
+    it, moved likewise."""
+    points, strength, seed = samples.points, settings.denoise, settings.seed
+    spacing = local_spacing(points, progress.part(0.0, 0.1))
+    moved, done = denoise(points, spacing, strength, seed, progress.part(0.1, 0.9))
+    if not done:
+        return samples, {}
+    filled, even = (False, False) if "voxel" in done else fills_volume(points, done["neighbours"][1], seed)
+    if filled and even and settings.outliers:
+        inside = ~bounds_volume(points, spacing, seed, progress.part(0.9, 0.92))
+        if inside.any():
+            samples = samples.without(inside, _said_of_inside(inside, "a volume that they fill"))
+            return _off_noise(samples, settings, progress.part(0.92, 1.0))
+    done |= {name: done[name] * samples.scale for name in ("noise", "mean_move", "voxel") if name in done}
+    return samples.moved(moved, *_said_of_moved(done, filled, strength)), done
+
+
 def _said_of_moved(done, filled, strength):
-    """What to warn of where points were moved: a surface that is a guess, and moves that nobody asked for."""
+    """What to warn of: a surface that is a guess, moves that nobody asked for."""
     if "voxel" in done:
         yield (
             f"points are in steps of {done['voxel']:.2g}, as voxels and whole heights are: they were moved off these; "

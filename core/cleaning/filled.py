@@ -7,7 +7,7 @@ from ..linalg import row_dots
 from ..voronoi.facets import by_blocks
 from .anchors import some_samples
 
-_ASKED = 500  # samples
+_FEWEST, _ASKED = 256, 500  # samples
 _LEAST = 64  # neighbours: among fewer any noise fills a volume
 _FILLED = 2.5  # pointwise dimension; 2.55 to 2.9 in solids, 1.9 to 2.4 in noise of up to two spacings on surfaces
 _AMONG = 32  # neighbours, of which noise has some far away, in its tails
@@ -23,6 +23,8 @@ def fills_volume(points, neighbours: int, seed: int) -> tuple[bool, bool]:
     Told by their pointwise dimension (J. D. Farmer, E. Ott and J. A. Yorke, Physica D 7, 1983): a radius that is twice
     as large has 2^d times as many of them around a sample. Noise fills what is as thin as it is, and no more.
     """
+    if len(points) < _FEWEST:
+        return False, False
     most = min(max(neighbours, _LEAST), len(points) - 1)
     least, asked = most // 4, points[some_samples(points, min(_ASKED, len(points)), seed)]
     near, some, far = np.log(KDTree(points).query(asked, k=[least + 1, _AMONG + 1, most + 1], workers=-1)[0].T)
