@@ -1,8 +1,11 @@
 """Before stage one: strays are dropped and noise is taken off; :mod:`.clean` does both.
 
-surroundings, detached, far_parts, off_wires, outliers : which samples are strays
-anchors, flat_patches, roughness, thin_walls, voxels   : what looks noisy, and what only seems so or surely is
-noise                                                  : which are noisy
-noise_level, positions, depth_steps                    : how noisy, and where those lie without the noise
-filled                                                 : whether they fill a volume, and which of them bound it
+outliers, surroundings                       : which samples are strays, and what is looked at in each
+detached, far_parts, off_wires, standing_out : the kinds of strays
+noise, roughness, anchors                    : which samples are noisy, by how far some of them are off quadrics
+thin_walls, flat_patches                     : clean samples that look noisy
+eyes, averaged                               : noisy ones that look like those
+voxels, depth_steps                          : samples in steps, which are off the surface by up to half of one
+noise_level, positions                       : how noisy samples are, and where they lie without the noise
+filled                                       : those that fill a volume, and which of them bound it
 """

@@ -1,1 +1,6 @@
-"""Voronoi bisectors of the samples: the facets between neighbours, in blocks of points, and samples on them."""
+"""Voronoi bisectors of the samples.
+
+facets, blocks      : the facets between neighbours, found in blocks of points
+lines               : how far samples on lines look for neighbours
+polygons, bisectors : facets as polygons, and samples on them
+"""

@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -76,3 +77,10 @@ def test_no_module_names_blender_or_itself(source):
     """Inside a Blender extension the package is not called `core`, so its own imports have to be relative."""
     names = {name.split(".")[0] for name in imports(source)}
     assert names.isdisjoint({"bpy", "core", "vad_addon", "mathutils"})
+
+
+@pytest.mark.parametrize("package", sorted({path.parent for path in SOURCES} - {ROOT / "core"}), ids=lambda p: p.name)
+def test_a_package_says_what_each_of_its_modules_is_for(package):
+    said = set(re.findall(r"\w+", ast.get_docstring(ast.parse((package / "__init__.py").read_text()))))
+    modules = {source.stem for source in SOURCES if source.parent == package} - {"__init__"}
+    assert not modules - said
