@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..linalg import cross, lengths, unit_columns
+from ..linalg import cross, dots, lengths, unit_columns
 from ..lookup import numbered
 from ..parallel import over_rows
 from ..parts import connected_parts
@@ -81,6 +81,12 @@ class Mesh:
         first, second, third = (chosen[corner] for corner in self.faces.T)
         return first | second | third
 
+    def around(self, chosen: np.ndarray, rings: int = 1) -> np.ndarray:
+        """The vertices that are `chosen`, (v,) bool, and those of so many rings of faces around them, (v,) bool."""
+        for _ in range(rings):
+            chosen = self.vertices_of(self.faces_at(chosen))
+        return chosen
+
     def part(self, kept: np.ndarray) -> "Mesh":
         """The mesh of the faces marked in `kept`, as :meth:`of_faces`, with their vertices alone."""
         mesh = self.of_faces(kept)
@@ -139,6 +145,12 @@ def at_corners(x: np.ndarray, faces: np.ndarray) -> list[np.ndarray]:
 def face_normals(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     """Normals (3,...) of triangles with corners (3,...) each, twice as long as their areas."""
     return cross(b - a, c - a)
+
+
+def turns_around(a: np.ndarray, b: np.ndarray, c: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """How the sides of triangles with corners a, b, c (3,...) turn around the line through the origin along `way`
+    (3,...): (3,...), none below zero or none above it where that line passes the triangle."""
+    return np.stack([dots(cross(p, q), way) for p, q in ((a, b), (b, c), (c, a))])
 
 
 def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

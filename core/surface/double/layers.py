@@ -5,11 +5,11 @@ Both are pulled onto the surface, and where it bends the triangles of either are
 
 import numpy as np
 
-from ...linalg import cross, dots, lengths, unit
+from ...linalg import dots, lengths, unit
 from ...parallel import work_through
 from ...progress import Progress
 from ...trees import k_nearest, quick_tree
-from ..mesh import Mesh, at_corners, face_normals
+from ..mesh import Mesh, at_corners, face_normals, turns_around
 from ..meshing.centring import Bend, bend_of
 
 HAIR = 3e-4  # cells, between the layers
@@ -39,7 +39,7 @@ def laid_apart(mesh: Mesh, cell: float, progress=None) -> Mesh:
 
 
 def _cleared(mesh: Mesh, bend: Bend, cell: float, progress: Progress) -> Mesh:
-    beside = mesh.vertices_of(mesh.faces_at(bend.sharp))
+    beside = mesh.around(bend.sharp)
     edges = np.stack([mesh.edges.low, mesh.edges.high])
     ends = np.concatenate([np.tile(np.arange(len(beside)), (2, 1)), edges[:, beside[edges].all(axis=0)]], axis=1)
     place, outward = (0.5 * (x[ends[0]] + x[ends[1]]) for x in (mesh.vertices, bend.normal))
@@ -71,9 +71,9 @@ def _other_layer(mesh, place, outward, cell, progress):
         other = normal.take(face, axis=1)
         along = dots(other, way[:, None])
         a, b, c = (corner.take(face, axis=1) - at[:, None] for corner in corners)
-        turns = [dots(cross(p, q), way[:, None]) for p, q in ((a, b), (b, c), (c, a))]
+        turns = turns_around(a, b, c, way[:, None])
         depth = -dots(a, other) / np.minimum(along, _OPPOSITE)  # of others, it does not count
-        hit = (np.max(turns, axis=0) <= 0) & (along < _OPPOSITE) & (np.abs(depth) < _REACH * cell)
+        hit = (turns.max(axis=0) <= 0) & (along < _OPPOSITE) & (np.abs(depth) < _REACH * cell)
         nearest = np.where(hit, np.abs(depth), np.inf).argmin(axis=0), np.arange(face.shape[1])
         which[part] = face[nearest]
         behind[part] = np.where(hit[nearest], depth[nearest], np.inf)

@@ -26,8 +26,8 @@ def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float
     moved = (loose.vertices != mesh.vertices).any(axis=1)
     if not moved.any():
         return mesh
-    among = loose.vertices_of(loose.faces_at(moved))
-    return taken_back(sharpened(loose, passing, surface, cell, progress.part(0.6, 1.0), among), loose.vertices)
+    sharp = sharpened(loose, passing, surface, cell, progress.part(0.6, 1.0), loose.around(moved))
+    return taken_back(sharp, loose.vertices)
 
 
 def sharpened(
@@ -43,7 +43,7 @@ def sharpened(
     farthest = np.where(_passing(mesh.vertices, passing, surface), _INTO_LINES, _INTO)
     for outward, part in progress.turns(ways):
         vertices, (normal, least) = mesh.vertices, mesh.normals
-        row, side = np.flatnonzero(mesh.vertices_of(mesh.faces_at(least < FLAT)) & among), np.zeros_like(vertices)
+        row, side = np.flatnonzero(mesh.around(least < FLAT) & among), np.zeros_like(vertices)
         way = outward * normal[row]
         found = surface.project(vertices[row] + _ASIDE * cell * way, part.part(0.0, 0.5))
         direction, back = found.direction, np.linalg.norm(_ASIDE * cell * way - found.step, axis=1) < _BACK * cell

@@ -35,7 +35,7 @@ def unfolded(mesh: Mesh, surface: LocalSurface, cell: float, held: np.ndarray | 
     near[near] = _folded(*_cut_out(mesh, near)[1:])[0]
     if not near.any():
         return mesh
-    near = mesh.with_halves(mesh.faces_at(_grown(mesh, near, _AROUND)))
+    near = mesh.with_halves(mesh.faces_at(mesh.around(mesh.vertices_of(near), _AROUND)))
     row, part, cut = _cut_out(mesh, near)
     for stays in (cut | np.broadcast_to(held, len(mesh.vertices))[row], cut):
         for rings in range(_RINGS):
@@ -46,7 +46,8 @@ def unfolded(mesh: Mesh, surface: LocalSurface, cell: float, held: np.ndarray | 
                 folded, rim = _folded(part, cut)
             if not folded.any():
                 break
-            part = _relaxed(part, _grown(part, folded, rings) & ~(stays | rim), surface, cell)
+            moving = part.around(part.vertices_of(folded), rings) & ~(stays | rim)
+            part = _relaxed(part, moving, surface, cell)
     return mesh.with_part(near, row, _where_it_covers(part, mesh.vertices[row], surface, cell))
 
 
@@ -85,14 +86,6 @@ def _cut_out(mesh, near):
     which of its vertices others have, too, (p,) bool."""
     row = np.flatnonzero(mesh.vertices_of(near))
     return row, mesh.part(near), mesh.vertices_of(~near)[row]
-
-
-def _grown(mesh, chosen, rings):
-    """The vertices of the faces `chosen`, (f,) bool, and of so many rings of faces around them, (v,) bool."""
-    found = mesh.vertices_of(chosen)
-    for _ in range(rings):
-        found = mesh.vertices_of(mesh.faces_at(found))
-    return found
 
 
 def _folded(mesh, cut):

@@ -9,9 +9,9 @@ from itertools import chain
 import numpy as np
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots, lengths
+from ...linalg import dots, lengths
 from ...trees import quick_tree
-from ..mesh import Mesh, at_corners, face_normals
+from ..mesh import Mesh, at_corners, face_normals, turns_around
 from .unfolding import smoothed
 
 _BENT = 0.5  # least cosine between the normals of a vertex and of its faces; around what crosses one has less
@@ -50,19 +50,15 @@ def _without_crossings(mesh, before, asked, smooth):
     moved in the last round."""
     if not asked.any():
         return mesh
-    around = asked
-    for _ in range(_AROUND):
-        near = mesh.faces_at(around)
-        around = mesh.vertices_of(near)
-    row = np.flatnonzero(around)
+    near = mesh.faces_at(mesh.around(asked, _AROUND - 1))
+    row = np.flatnonzero(mesh.vertices_of(near))
     part, held, start = mesh.part(near), mesh.vertices_of(~near)[row], before[row]
     asked = part.faces_at(asked[row])
     for step in range(_ROUNDS + 1):
         tangled = part.vertices_of(crossing_faces(part, asked).reshape(-1))
         if not tangled.any():
             break
-        for _ in range(step // 2):
-            tangled = part.vertices_of(part.faces_at(tangled))
+        tangled = part.around(tangled, step // 2)
         if smooth is None or step == _ROUNDS:
             part = part.moved(np.where(tangled[:, None], start, part.vertices))
         else:
@@ -91,8 +87,8 @@ def crossing_faces(mesh: Mesh, asked: np.ndarray) -> np.ndarray:
         for k in range(3):
             start, way = corners[k - 1][:, edges], corners[k][:, edges] - corners[k - 1][:, edges]
             a, b, c = corners[:, :, plane] - start
-            turn = np.stack([dots(way, cross(p, q)) for p, q in ((a, b), (b, c), (c, a))])
-            through = (turn.min(axis=0) >= 0) | (turn.max(axis=0) <= 0)
+            turns = turns_around(a, b, c, way)
+            through = (turns.min(axis=0) >= 0) | (turns.max(axis=0) <= 0)
             hit |= (height[k - 1] * height[k] < 0) & through
     return np.stack([one[hit], other[hit]])
 

@@ -11,11 +11,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ...field.local_surface import LocalSurface
-from ...linalg import cross, dots, row_dots, unit
+from ...linalg import dots, row_dots, unit
 from ...lookup import edge_keys, numbered, rows_of, sums_of_each
 from ...parts import connected_parts
 from ...trees import k_nearest, quick_tree
-from ..mesh import Mesh, at_corners, face_normals
+from ..mesh import Mesh, at_corners, face_normals, turns_around
 from ..meshing.fillings import fillings
 
 _LONGEST = 64  # edges of a loop that may be closed
@@ -139,7 +139,7 @@ def _covered(mesh, triangle, loop, loops, cell):
     a, b, c = (corner[:, row] - middle.T[:, :, None] for corner in (a, b, c))
     normal = face_normals(a, b, c)
     size = np.maximum(np.sqrt(dots(normal, normal)), _TINY)
-    within = np.min([dots(cross(p, q), normal) for p, q in ((a, b), (b, c), (c, a))], axis=0) >= 0
+    within = turns_around(a, b, c, normal).min(axis=0) >= 0
     on = (within & (np.abs(dots(a, normal)) <= _ON * cell * size)).any(axis=1)
     return np.bincount(loop[large], on * area[large], loops) / np.maximum(total, _TINY)
 
