@@ -16,6 +16,13 @@ def is_among(wanted: np.ndarray, ascending: np.ndarray) -> np.ndarray:
     return rows_of(wanted, ascending) >= 0
 
 
+def mask_of(rows: np.ndarray, n: int) -> np.ndarray:
+    """Which of n items are among some rows, of any shape, (n,) bool."""
+    found = np.zeros(n, bool)
+    found[rows] = True
+    return found
+
+
 def numbered(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The distinct ones of some numbers, ascending, and which of them each is, of the shape of `keys`. Asked for the
     first of each as well, NumPy sorts by merging, which is quick on runs."""

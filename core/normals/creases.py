@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import row_dots, unit
+from ..lookup import mask_of
 from ..parallel import in_order
 from ..progress import Progress
 from .mirrors import Mirrors
@@ -93,8 +94,7 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress
         turned = np.abs(row_dots(axes, normals[row])) < np.cos(_LEAST_TURN)
         if not turned.any():
             break
-        changed = np.zeros(len(points), bool)
-        changed[row[turned]] = True
+        changed = mask_of(row[turned], len(points))
         normals[changed] = axes[turned]
         moved |= changed
     return normals, moved

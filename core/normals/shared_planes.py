@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import dots, row_dots, unit
+from ..lookup import mask_of
 from ..parallel import in_order
 from .mirrors import Mirrors
 from .planes import neighbourhoods, parts_of
@@ -48,9 +49,7 @@ def _offered(mirrors, normals):
     theirs = columns.take(mirrors.other, axis=1)
     pair = np.flatnonzero(np.abs(dots(theirs, mirrors.direction)) < _INSIDE)
     unlike = np.abs(dots(theirs[:, pair], columns[:, mirrors.site[pair]])) < _UNLIKE
-    found = np.zeros(len(normals), bool)
-    found[mirrors.site[pair[unlike]]] = True
-    return found
+    return mask_of(mirrors.site[pair[unlike]], len(normals))
 
 
 def _most_shared(row, points, spacing, tree, normals):

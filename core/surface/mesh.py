@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ..linalg import cross, dots, lengths, unit_columns
-from ..lookup import numbered
+from ..lookup import mask_of, numbered
 from ..parallel import over_rows
 from ..parts import connected_parts
 from .mesh_edges import Edges
@@ -72,9 +72,7 @@ class Mesh:
 
     def vertices_of(self, chosen: np.ndarray) -> np.ndarray:
         """Which vertices faces `chosen`, (f,) bool or rows, have, (v,) bool."""
-        found = np.zeros(len(self.vertices), bool)
-        found[self.faces[chosen]] = True
-        return found
+        return mask_of(self.faces[chosen], len(self.vertices))
 
     def faces_at(self, chosen: np.ndarray) -> np.ndarray:
         """Which faces have a vertex that is `chosen`, (v,) bool, (f,) bool."""
@@ -155,8 +153,7 @@ def turns_around(a: np.ndarray, b: np.ndarray, c: np.ndarray, way: np.ndarray) -
 
 def in_use(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The vertices (v,3) that faces (f,k) have, and the faces with their numbers."""
-    used = np.zeros(len(vertices), bool)
-    used[faces] = True
+    used = mask_of(faces, len(vertices))
     return vertices[used], (np.cumsum(used) - 1)[faces]
 
 

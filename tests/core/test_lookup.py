@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from core.lookup import edge_keys, grouped, is_among, least_of_each, numbered, rows_of, sums_of_each
+from core.lookup import edge_keys, grouped, is_among, least_of_each, mask_of, numbered, rows_of, sums_of_each
 
 NUMBERS = arrays(np.int64, st.integers(0, 30), elements=st.integers(-5, 20))
 
@@ -25,6 +25,11 @@ def test_answers_have_the_shape_of_the_question(shape, random):
     assert rows_of(wanted, ascending).shape == is_among(wanted, ascending).shape == shape
     assert (rows_of(wanted, ascending[:0]) == -1).all()
     assert numbered(wanted)[1].shape == shape
+
+
+@given(arrays(np.int64, st.tuples(st.integers(0, 9), st.integers(0, 3)), elements=st.integers(0, 20)))
+def test_a_mask_of_rows_marks_those(rows):
+    assert np.flatnonzero(mask_of(rows, 21)).tolist() == sorted(set(rows.reshape(-1).tolist()))
 
 
 @given(NUMBERS)

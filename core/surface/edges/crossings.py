@@ -21,7 +21,7 @@ from ...field.grid import CORNERS, Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import COMPONENTS, dots, principal_axes, row_dots
-from ...lookup import least_of_each, numbered
+from ...lookup import least_of_each, mask_of, numbered
 from ...parallel import even_chunks, in_order, work_through
 from ...progress import Progress
 from ...trees import k_nearest
@@ -156,8 +156,7 @@ def _once(meet):
 
 def _in_whole_cells(band, lowest, edge):
     """Which edges (e,) have four cells around them whose lowest nodes are among the rows `lowest`, (e,) bool."""
-    whole = np.zeros(len(band.node) + 1, bool)
-    whole[lowest] = True
+    whole = mask_of(lowest, len(band.node) + 1)
     row, axis = np.divmod(edge, 3)
     first, second = (axis + 1) % 3, (axis + 2) % 3
     back = band.behind[first, row]

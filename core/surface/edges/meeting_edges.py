@@ -8,7 +8,7 @@ from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import row_dots
-from ...lookup import least_of_each
+from ...lookup import least_of_each, mask_of
 from ...parallel import in_order
 from ...progress import Progress
 from .meetings import Meetings
@@ -98,9 +98,7 @@ def _along(axis, ahead, sheets, x, cell, hair):
 
 def _least(key, cost):
     """Whether each line has the least cost of those with its key, (e,) bool; the first of equals."""
-    chosen = np.zeros(len(key), bool)
-    chosen[least_of_each(key, cost)] = True
-    return chosen
+    return mask_of(least_of_each(key, cost), len(key))
 
 
 def _reaches(place, normal, beyond, sheets: Sheets, near, surface, through, nodes, cell, hair):

@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 from ...field.local_surface import LocalSurface
 from ...field.projection import MEMBER, TRUSTED, membership
 from ...linalg import cross, dots, row_dots
-from ...lookup import numbered
+from ...lookup import mask_of, numbered
 from ...parallel import even_chunks, in_order, over_rows
 from ...parts import connected_parts
 from ...progress import Progress
@@ -106,17 +106,10 @@ def find_meetings(surface: LocalSurface, progress=None, by_room: bool = False) -
     apart[rest] = _in_threes(i[rest], j[rest], nearest, unlike, surface)
     pairs, found = (np.bincount(i[chosen], minlength=n)[nearest].sum(axis=1) for chosen in (slice(None), apart))
     at = _grown(*((found >= _LEAST) & (found >= share * pairs) for share in (_SHARE, _WEAK)), nearest)
-    through = _among(n, i[askew][close == 2], j[askew][close == 2])
-    side_by_side = apart & (cosine > SIDE_BY_SIDE)
-    beside = at & _among(n, i[side_by_side], j[side_by_side])
+    pair = np.stack([i, j])
+    through = mask_of(pair[:, askew[close == 2]], n)
+    beside = at & mask_of(pair[:, apart & (cosine > SIDE_BY_SIDE)], n)
     return Meetings(at, through, beside, _of_lines(through, nearest)[nearest[:, :_PASSING]].any(axis=1))
-
-
-def _among(n, *rows):
-    """Which of n samples are among some rows, (n,) bool."""
-    found = np.zeros(n, bool)
-    found[np.concatenate(rows)] = True
-    return found
 
 
 def _grown(sure, weak, nearest):

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...field.local_surface import LocalSurface
 from ...linalg import row_dots
-from ...lookup import numbered
+from ...lookup import mask_of, numbered
 from ...parts import connected_parts
 from ...progress import Progress
 from ..mesh_edges import Edges
@@ -114,6 +114,5 @@ def _closest_ends(low, high, length):
         best = np.full(len(length), len(length))
         np.minimum.at(best, low, rank[high])
         np.minimum.at(best, high, rank[low])
-        ending = np.isin(np.arange(len(length)), np.append(low, high))
-        chosen |= ending & can & (rank < best)
+        chosen |= mask_of(np.append(low, high), len(length)) & can & (rank < best)
     return chosen

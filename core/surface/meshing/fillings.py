@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...lookup import edge_keys
+from ...lookup import edge_keys, mask_of
 
 _FAIR = 0.1  # weight of the squared sides of a triangle beside its area
 _BOUND, _THERE = 1e2, 1e6  # square cells, what an edge and a face count that the mesh has already
@@ -17,8 +17,7 @@ def fillings(vertices, loops, edges, faces, cell: float) -> tuple[np.ndarray, np
     Sharir, CAGD 12(2), 1995). The `edges` (e,2) that there are, are passed by where that can be helped; a loop that
     cannot be spanned without one of the `faces` (f,3) that there are gets no triangles.
     """
-    at_loop = np.zeros(len(vertices), bool)
-    at_loop[np.concatenate(loops)] = True
+    at_loop = mask_of(np.concatenate(loops), len(vertices))
     vertex, number = np.flatnonzero(at_loop), np.cumsum(at_loop) - 1
     edges, faces = (number[some[at_loop[some].all(axis=1)]] for some in (edges, faces))
     triangle, loop = _fillings(vertices[vertex], [number[loop] for loop in loops], edges, faces, cell)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...linalg import dots, lengths
+from ...lookup import mask_of
 from ..mesh import Mesh, at_corners, face_normals
 
 _SHORT = 0.3  # cells, edges whose ends become one
@@ -84,8 +85,7 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     at = number[faces]
     edge, gone = at.max(axis=1), (at >= 0).sum(axis=1) == 2
     alike = _alike(*(face_normals(*at_corners(places, faces[~gone])) for places in (x, joined)), cell)
-    stays = np.zeros(ends.shape[1], bool)
-    stays[edge[~gone][~alike]] = True
+    stays = mask_of(edge[~gone][~alike], ends.shape[1])
     across = faces[gone][at[gone] < 0]
     stays[edge[gone][np.diff(links.indptr)[across] == 3]] = True
     one, other = ends[:, ~stays]

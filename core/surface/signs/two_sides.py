@@ -25,7 +25,7 @@ from ...field.grid import ADJACENT, Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import conjugate_gradients, row_dots, symmetric
-from ...lookup import grouped, is_among, numbered
+from ...lookup import grouped, is_among, mask_of, numbered
 from ...parallel import over_rows
 from ...parts import extents, near_parts
 from ...progress import Progress
@@ -245,8 +245,7 @@ def _agree(votes, side, band, grid, progress):
 
 def _parted(graph, row):
     """Whether the nodes around those of some rows are in several parts, once these and the next are taken out."""
-    reached = np.zeros(graph.shape[0], bool)
-    reached[row] = True
+    reached = mask_of(row, graph.shape[0])
     for step in range(_RING):
         if step == _CUT:
             cut = reached

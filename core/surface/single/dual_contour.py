@@ -7,7 +7,7 @@ import numpy as np
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...linalg import shortened
-from ...lookup import numbered, sums_of_each
+from ...lookup import mask_of, numbered, sums_of_each
 from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
@@ -68,6 +68,4 @@ def _without_repeats(mesh):
     proper = np.flatnonzero((low < middle) & (middle < high))
     edge = numbered(low[proper] * len(mesh.vertices) + middle[proper])[1]
     _, first = np.unique(edge * len(mesh.vertices) + high[proper], return_index=True)
-    kept = np.zeros(len(low), bool)
-    kept[proper[first]] = True
-    return mesh.of_faces(kept)
+    return mesh.of_faces(mask_of(proper[first], len(low)))

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ...field.local_surface import LocalSurface
 from ...linalg import dots, row_dots, unit
-from ...lookup import edge_keys, numbered, rows_of, sums_of_each
+from ...lookup import edge_keys, mask_of, numbered, rows_of, sums_of_each
 from ...parts import connected_parts
 from ...trees import k_nearest, quick_tree
 from ..mesh import Mesh, at_corners, face_normals, turns_around
@@ -164,8 +164,7 @@ def _closed(paths, mesh, edges, cell):
     length = np.linalg.norm(np.diff(mesh.vertices[ways], axis=1)[:, 0], axis=1)
     graph = coo_matrix((np.maximum(length, _TINY), tuple(ways.T)), shape=(n, n)).tocsr()
     steps = [edge_keys(np.stack([path[:-1], path[1:]], axis=1), n) for path in paths]
-    at_path = np.zeros(n, bool)
-    at_path[np.concatenate(paths)] = True
+    at_path = mask_of(np.concatenate(paths), n)
     ends, beyond = _sides(mesh.faces[at_path[mesh.faces].sum(axis=1) > 1])
     beside = dict(zip(edge_keys(ends, n).tolist(), beyond.tolist(), strict=True))
     loops = []

@@ -6,7 +6,7 @@ from ...field.blocks import Blocks
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
-from ...lookup import numbered, sums_of_each
+from ...lookup import mask_of, numbered, sums_of_each
 from ...parts import connected_parts
 from ...progress import Progress
 from ..edges.first_steps import first_steps
@@ -61,9 +61,8 @@ def _trimmed(vertices, faces, band, surface, grid, progress):
     kept = np.ones(len(faces), bool)
     kept[row[off]] = ~_connected_to(found.distance[off] > _FAR * grid.spacing, faces[row[off]])
     corner, at = faces[kept].reshape(-1), np.repeat(middle[kept], faces.shape[1], axis=0)
-    share, bare = np.bincount(corner, minlength=len(vertices)), np.zeros(len(vertices), bool)
-    bare[faces[~kept]] = True
-    rim = np.flatnonzero(bare & (share > 0))
+    share = np.bincount(corner, minlength=len(vertices))
+    rim = np.flatnonzero(mask_of(faces[~kept], len(vertices)) & (share > 0))
     total = sums_of_each(corner, at, len(vertices))
     vertices = vertices.copy()
     vertices[rim] = total[rim] / share[rim, None]

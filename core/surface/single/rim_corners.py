@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...linalg import row_dots
+from ...lookup import mask_of
 
 _FROM, _TO = 0.5, 3.0  # local spacings from a vertex, between which a line is laid along the border on either side
 _TURN = 1.0  # radians, least angle between both lines at a corner
@@ -41,9 +42,7 @@ class Border:
         among = np.concatenate([peak[None], around[:, peak]])
         away = self.vertices[self.loop[among]] - _where_lines_meet(p[peak], one[peak], q[peak], other[peak])
         nearest = np.where(among >= 0, row_dots(away, away), np.inf).argmin(axis=0)
-        corner = np.zeros(len(self.loop), bool)
-        corner[among[nearest, np.arange(len(peak))]] = True
-        return corner
+        return mask_of(among[nearest, np.arange(len(peak))], len(self.loop))
 
     def within(self, reach: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Which are `chosen` (l,) bool, or have one that is within `reach` (l,) along the border, (l,) bool."""

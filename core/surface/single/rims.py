@@ -14,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 
 from ...field.local_surface import LocalSurface
 from ...linalg import COMPONENTS, lengths, principal_axes, row_dots, shortened, unit
-from ...lookup import sums_of_each
+from ...lookup import mask_of, sums_of_each
 from ..mesh import Mesh, at_corners, face_normals
 from .rim_corners import Border
 
@@ -105,9 +105,7 @@ def _outward(mesh, least):
 
 def _axes(mesh, row):
     """Normals (r,3) of the vertices `row` (r,), of either sign, whichever way the faces are wound."""
-    asked = np.zeros(len(mesh.vertices), bool)
-    asked[row] = True
-    faces = mesh.faces[mesh.faces_at(asked)]
+    faces = mesh.faces[mesh.faces_at(mask_of(row, len(mesh.vertices)))]
     normal = face_normals(*at_corners(mesh.vertices, faces))
     normal /= np.sqrt(np.maximum(lengths(normal), np.finfo(float).tiny))
     products = (np.tile(normal[i] * normal[j], 3) for i, j in COMPONENTS)

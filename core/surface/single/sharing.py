@@ -10,7 +10,7 @@ import numpy as np
 
 from ...field.grid import Grid, node_strides
 from ...linalg import row_dots
-from ...lookup import numbered
+from ...lookup import mask_of, numbered
 from ...parts import connected_parts
 from ..edges.crossings import Crossings
 from ..edges.sheets import STEEP
@@ -45,8 +45,7 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
     face, turn = _on_faces(owner[at], cell[corner[at]], crossings, grid)
     one, other, ended = _lines(sheet[at], corner[at], face, turn, owner[at])
     vertex = connected_parts(one, other, len(corner))[sheet]
-    open_cell = np.zeros(len(cell), bool)
-    open_cell[corner[np.isin(sheet, ended, kind="table")]] = True
+    open_cell = mask_of(corner[np.isin(sheet, ended, kind="table")], len(cell))
     leader = np.full(len(cell), len(corner))
     np.minimum.at(leader, corner, vertex)
     vertex = np.where(open_cell[corner], leader[corner], vertex)
