@@ -14,8 +14,7 @@ from .roughness import least_part, roughness
 from .thin_walls import is_shift, two_sheets
 from .voxels import Voxels, find_voxels
 
-MINIMUM_SAMPLES = 100  # fewer say nothing about noise
-
+_FEWEST = 100  # samples; fewer say nothing about noise
 _AGREED = 0.96  # median confidence of normals that noise of a tenth of a local spacing does not reach
 _TURNED = 1.5  # times the squared level, in local spacings, that slight noise takes off the confidence of normals
 _CORE_LEVEL = 0.1  # local spacings: the core of a noisy part is above this
@@ -29,7 +28,7 @@ _STAIRS, _UNEVEN = 0.2, 0.03  # share of samples in a region of voxels, and loca
 def looks_noisy(points, spacing) -> bool:
     """Whether samples (n,3) with local spacing (n,) are as far off quadrics as noisy ones are, or voxels; quick, and
     less sure than :func:`noisy_samples`, which asks the normals as well."""
-    if len(points) < MINIMUM_SAMPLES:
+    if len(points) < _FEWEST:
         return False
     found, voxels = roughness(points, spacing, 0, Progress()), find_voxels(points)
     return found.whole or (voxels is not None and _around_stairs(found, voxels).any())
@@ -51,7 +50,7 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
     Samples of `voxels` lie in layers, which show neither of that; these are noisy around stairs as well.
     """
     clean = np.zeros(len(points), bool)
-    if len(points) < MINIMUM_SAMPLES:
+    if len(points) < _FEWEST:
         return clean
     progress = Progress.of(progress)
     found = roughness(points, spacing, seed, progress)

@@ -15,9 +15,7 @@ from .detached import detached_clouds
 from .far_parts import far_parts
 from .off_wires import off_wires
 from .standing_out import hovering, proud
-from .surroundings import NEIGHBOURS, SHEET, Surroundings, thickness
-
-MINIMUM_SAMPLES = 100  # fewer leave nothing to compare a sample with
+from .surroundings import FEWEST, NEIGHBOURS, SHEET, Surroundings, thickness
 
 _ROUNDS = 6  # strays hide strays
 _LONELY = 2.0  # spacing over that of the neighbours
@@ -55,7 +53,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)
-    if len(points) < MINIMUM_SAMPLES:
+    if len(points) < FEWEST:
         return stray
     for turn, part in progress.turns(range(_ROUNDS)):
         kept = np.flatnonzero(~stray)
@@ -80,7 +78,7 @@ def find_outliers(points, progress=None) -> np.ndarray:
         if dirty:
             found |= hovering(around, part.part(0.8, 1.0)) & others
         stray[kept[found]] = True
-        if not found.any() or (~stray).sum() < MINIMUM_SAMPLES:
+        if not found.any() or (~stray).sum() < FEWEST:
             break
     return stray
 

@@ -6,7 +6,7 @@ from scipy.spatial import KDTree
 from ..neighbourhoods.quadrics import fit_quadrics, quadrics_at
 from ..progress import Progress
 from ..trees import k_nearest
-from .surroundings import NEIGHBOURS, Surroundings
+from .surroundings import FEWEST, NEIGHBOURS, Surroundings
 
 _AT_ITS_HEIGHT = 24, 6, 0.15  # samples with itself; so many this close to its height, over their spacing, are a sheet
 _PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
@@ -15,7 +15,6 @@ _SUSPECT = 1.4  # spacing over that of the neighbours
 _HOVERING = 7.5  # distance from the quadric over the largest of the medians around each neighbour
 _FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
 _PLANES = 16, 0.15, 2  # the nearest; so close to the planes of so many of these, over their spacing, sheets cross
-_FEWEST = 100  # samples that are no suspects, of which fewer are no surface to measure against
 
 
 def proud(around: Surroundings) -> np.ndarray:
@@ -36,7 +35,7 @@ def hovering(around: Surroundings, progress: Progress) -> np.ndarray:
     suspect = (_standing_out(around, higher, height, 1.0) | (around.lonely > _SUSPECT)) & ~around.wire
     suspect = _in_no_sheet(around, suspect)
     row, rest = np.flatnonzero(suspect), np.flatnonzero(~suspect)
-    if not len(row) or len(rest) < _FEWEST:
+    if not len(row) or len(rest) < FEWEST:
         return np.zeros(len(points), bool)
     surface, tree = points[rest], KDTree(points[rest])
     near = k_nearest(tree, points[row], NEIGHBOURS)[1]

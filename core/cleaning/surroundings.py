@@ -8,6 +8,7 @@ from ..parallel import even_chunks, work_through
 from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
 
+FEWEST = 100  # samples; fewer leave nothing to compare one with
 NEIGHBOURS = 8
 SHEET = 0.25  # thickness of a wider neighbourhood, below which a sheet may be seen in it, a noisy one, too
 _SPARSE = 2.5  # spacing over the median of the cloud
