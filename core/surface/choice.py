@@ -16,11 +16,10 @@ from .double.double_cover import DENSE, double_cover
 from .double.ridges import ridge_share
 from .edges.meetings import Meetings
 from .mesh import Mesh
-from .meshing.misfit import chamfer, misfit
+from .meshing.misfit import BETTER, ROUGH, SHOWN, chamfer, misfit
 from .meshing.pieces import pieces_touch, pieces_with_samples
 from .signs.sides import may_be_closed
-from .single.routes import BETTER, ROUGH
-from .single.single_layer import SHOWN, SingleLayer
+from .single.single_layer import SingleLayer
 
 _MERGED = 0.4  # misfit of a double cover beyond which the single layer is looked at
 SPARSEST = 5.0  # cells, median local spacing up to which single layers have the handles of the surface alone

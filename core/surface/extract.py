@@ -14,11 +14,11 @@ from .choice import SPARSEST, Choice
 from .double.double_cover import CLAMP, SPARSE, level_for
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
-from .meshing.misfit import OFF, misfit
+from .meshing.misfit import BETTER, OFF, misfit
 from .meshing.pieces import without_small_pieces
 from .signed import signed_distance
 from .signs.sides import needed_band
-from .single.routes import BETTER, boundary_of_inside
+from .single.routes import boundary_of_inside
 
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said

@@ -8,9 +8,13 @@ from ...linalg import dots, lengths, unit_columns
 from ...trees import k_nearest, quick_tree
 from ..mesh import Mesh, at_corners, face_normals
 
+ROUGH = 0.12  # misfit of a mesh where sheets run side by side, beyond which another is looked at
+BETTER = 0.5  # times the misfit of one mesh, below which another is taken
+SHOWN = 0.005  # of the samples, that one mesh shows and another misses; fewer may be chance
+OFF = 0.5  # cells off a mesh, where a sample is missed
+
 _TORN = 0.07  # cells, mean distance of the samples to a mesh, above which it is torn
 _ASKEW = 0.1  # of its area, the same where faces are turned away from the samples
-OFF = 0.5  # cells off a mesh, where a sample is missed
 _FACES = 4  # that a sample may belong to
 _ASKED = 4096  # samples or faces, evenly picked out of more
 _NO_AREA = 1e-9  # of the square of a mesh's size, twice the area of one that has none
@@ -33,7 +37,7 @@ def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray |
     """
     if not len(mesh.faces):
         return np.inf
-    a, b, c = at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)])
+    a, b, c = at_corners(mesh.vertices, _some(mesh.faces))
     area, off = lengths(face_normals(a, b, c)), surface.project(((a + b + c) / 3).T).distance
     points, total = surface.points if points is None else points, area.sum()
     return (distances(mesh, points).mean() + off @ area / total) / cell if total else np.inf
@@ -50,7 +54,7 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
     corners = np.stack(at_corners(mesh.vertices, mesh.faces))
     centre, normal = corners.mean(axis=0), unit_columns(face_normals(*corners))
     radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
-    points = points[:: max(len(points) // _ASKED, 1)]
+    points = _some(points)
     row = k_nearest(quick_tree(centre.T), points, _FACES, workers=-1)[1]
     off = points.T[:, :, None] - centre[:, row]
     height = dots(off, normal[:, row])
@@ -61,10 +65,15 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 def askew(mesh: Mesh, tree: KDTree, normals: np.ndarray) -> float:
     """Share of the area of the mesh, of 4096 and more of its faces, that is turned by more than 45 degrees from the
     normal of the nearest sample, of those in the `tree` with `normals` (n,3); 1 for a mesh without area."""
-    corners = np.stack(at_corners(mesh.vertices, mesh.faces[:: max(len(mesh.faces) // _ASKED, 1)]))
+    corners = np.stack(at_corners(mesh.vertices, _some(mesh.faces)))
     normal = face_normals(*corners)
     area, nearest = lengths(normal), tree.query(corners.mean(axis=0).T, workers=-1)[1]
     total, turned = area.sum(), np.abs(dots(normal, normals[nearest].T)) < _TURNED * area
     if not len(area) or total <= _NO_AREA * np.ptp(mesh.vertices, axis=0).max() ** 2:
         return 1.0
     return float(area[turned].sum() / total)
+
+
+def _some(rows):
+    """All rows (n,k), or 4096 and more of them, evenly picked."""
+    return rows[:: max(len(rows) // _ASKED, 1)]

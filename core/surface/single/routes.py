@@ -16,7 +16,7 @@ from ..edges.crossings import Crossings
 from ..edges.meetings import Meetings
 from ..mesh import Mesh
 from ..meshing.finishing import finished
-from ..meshing.misfit import chamfer, misfit
+from ..meshing.misfit import BETTER, ROUGH, chamfer, misfit
 from ..meshing.untangling import untangled
 from ..signed import signed_mesh
 from ..signs.sides import Sides
@@ -31,8 +31,6 @@ from .rims import at_rims, smooth_rims
 from .scraps import without_scraps
 
 _PARTED = 0.01  # of the samples, missed by what parts sheets side by side, at most
-ROUGH = 0.12  # misfit of a mesh where sheets run side by side, beyond which another is looked at
-BETTER = 0.5  # times the misfit of one mesh, below which another is taken
 _MENDED = 2  # times, since holes may show where scraps are gone
 _BESIDE = 1.5  # cells from a line of more than two faces; borders there show that sheets were parted
 _BORDERED = 0.5  # edges of such borders for each of the line, at most; where there are more the sheets meet

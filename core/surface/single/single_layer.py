@@ -17,13 +17,11 @@ from ..edges.close_walls import beside_within_cells
 from ..edges.crossings import Crossings, find_crossings
 from ..edges.meetings import Meetings, find_meetings
 from ..mesh import Mesh
-from ..meshing.misfit import misfit
+from ..meshing.misfit import BETTER, ROUGH, SHOWN, misfit
 from ..signs.sides import Sides, find_sides
 from ..signs.two_sides import two_sided
-from .routes import BETTER, ROUGH, sheet_between_sides, sheet_of_crossings, sheet_of_sides
+from .routes import sheet_between_sides, sheet_of_crossings, sheet_of_sides
 from .thin_walls import with_thin_walls
-
-SHOWN = 0.005  # of the samples, that one layer shows and another misses; fewer may be chance
 
 
 def single_layer(
