@@ -39,6 +39,10 @@ def fused_axes(weight, pull, normals) -> np.ndarray:
     """
     weighted = weight * normals
     tensor = [row_dots(weighted[a], normals[b]) for a, b in COMPONENTS]
-    axes = principal_axes(np.stack(tensor, axis=1).astype(np.float64))
-    direction = np.einsum("imk,mk->mi", weighted, pull)
-    return axes * np.where(row_dots(axes, direction) < 0, -1.0, 1.0)[:, None]
+    return signed_axes(np.stack(tensor, axis=1).astype(np.float64), np.einsum("imk,mk->mi", weighted, pull))
+
+
+def signed_axes(tensors: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """The principal axes of tensors (m,6), signed by vectors (m,3), (m,3)."""
+    axes = principal_axes(tensors)
+    return axes * np.where(row_dots(axes, vectors) < 0, -1.0, 1.0)[:, None]

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.fft import dctn, idctn
 
 from ..errors import SettingsError
-from ..linalg import laplacian_symbol, outer, principal_axes, row_dots
+from ..linalg import laplacian_symbol, outer
 from ..progress import Progress
-from .diffusion import DIFFUSION_LENGTH
+from .diffusion import DIFFUSION_LENGTH, signed_axes
 from .grid import CORNERS, Grid
 
 LEAST_LENGTH = 0.5  # cells of sqrt(t)
@@ -62,14 +62,9 @@ def grid_axes(points, normals, spacing, grid: Grid, stride: int = 1, progress=No
     fused = np.stack(found, axis=-1)
     axes = np.empty((*fused.shape[:3], 3))
     for slab in progress.part(0.8, 1.0).chunks(len(fused), max(1, _CHUNK // fused[0, ..., 0].size)):
-        axes[slab] = _fused(fused[slab].reshape(-1, 9)).reshape(axes[slab].shape)
+        found = signed_axes(*np.split(fused[slab].reshape(-1, 9), [6], axis=1))
+        axes[slab] = found.reshape(axes[slab].shape)
     return axes
-
-
-def _fused(components):
-    """The principal axis of the tensors (m,6) that stand first, signed by the vectors (m,3) that follow."""
-    axes = principal_axes(components[:, :6])
-    return axes * np.where(row_dots(axes, components[:, 6:]) < 0, -1.0, 1.0)[:, None]
 
 
 def _diffusion_length(spacing):
