@@ -86,16 +86,16 @@ def _wound(triangle, loop, loops, mesh):
     """Triangles that fill loops, by the number of each, wound as most faces beside it are. They follow the loop's own
     direction, in which those have few of their edges."""
     key = (len(mesh.vertices), 1)
-    rims = np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in loops]).astype(np.int64)
+    rims, of = _edges_of(loops)
     along = np.isin(rims @ key, _sides(mesh.faces)[0].astype(np.int64) @ key)
-    share = np.bincount(np.repeat(np.arange(len(loops)), [len(rim) for rim in loops]), along - 0.5)
+    share = np.bincount(of, along - 0.5)
     return np.where(share[loop, None] > 0, triangle[:, [0, 2, 1]], triangle)
 
 
 def _reach(vertices, triangle, loop, loops, surface):
     """The longest edge inside each loop's filling, and how far off the surface the filling is, (loops,) each."""
     n, corners = len(vertices), vertices[triangle]
-    rims = edge_keys(np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in loops]), n)
+    rims = edge_keys(_edges_of(loops)[0], n)
     longest, off = np.zeros(len(loops)), np.zeros(len(loops))
     np.maximum.at(off, loop, surface.project(corners.mean(axis=1)).distance)
     for k in range(3):
@@ -115,10 +115,9 @@ def _doubled(mesh, border, loops):
     own = np.flatnonzero(np.isin(key, edge_keys(border, n)))
     own = own[np.argsort(key[own])]
     key, beyond = key[own], mesh.vertices[beyond[own]]
-    corner, after = (np.concatenate(part) for part in (loops, [np.roll(loop, -1) for loop in loops]))
-    of = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
-    tail, head, start = mesh.vertices[corner], mesh.vertices[after], mesh.vertices[[loop[0] for loop in loops]][of]
-    row = rows_of(edge_keys(np.stack([corner, after], axis=1), n), key)
+    edges, of = _edges_of(loops)
+    (tail, head), start = mesh.vertices[edges.T], mesh.vertices[[loop[0] for loop in loops]][of]
+    row = rows_of(edge_keys(edges, n), key)
     length = np.linalg.norm(head - tail, axis=1) * (row >= 0)
     axis = unit(sums_of_each(of, np.cross(tail - start, head - start)))
     side = row_dots(unit(np.cross(head - tail, beyond[row] - tail)), axis[of])
@@ -142,6 +141,12 @@ def _covered(mesh, triangle, loop, loops, cell):
     within = turns_around(a, b, c, normal).min(axis=0) >= 0
     on = (within & (np.abs(dots(a, normal)) <= _ON * cell * size)).any(axis=1)
     return np.bincount(loop[large], on * area[large], loops) / np.maximum(total, _TINY)
+
+
+def _edges_of(loops):
+    """The edges of loops from each vertex to the next, (s,2) int64, and the number of the loop of each, (s,)."""
+    edges = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in loops]).astype(np.int64)
+    return edges, np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
 
 
 def _sides(faces):
@@ -206,11 +211,7 @@ def _without_long_loops(edges):
 def _simple_loops(edges) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Loops that pass no vertex twice, and the paths that are left, as vertices in order, out of undirected edges
     (e,2): loops that touch are parted where they do."""
-    left = {}
-    for a, b in edges.tolist():
-        left.setdefault(a, set()).add(b)
-        left.setdefault(b, set()).add(a)
-    loops, dead = [], []
+    left, loops, dead = _neighbours(edges.tolist()), [], []
     for start in sorted(left):
         path, place = [start], {start: 0}
         while path:
@@ -237,11 +238,7 @@ def _simple_loops(edges) -> tuple[list[np.ndarray], list[np.ndarray]]:
 
 def _paths(edges):
     """Paths that run through all edges of a forest, each as far as it goes, as vertices in order."""
-    left = {}
-    for a, b in edges:
-        left.setdefault(a, set()).add(b)
-        left.setdefault(b, set()).add(a)
-    paths = []
+    left, paths = _neighbours(edges), []
     for start in sorted(left):
         while len(left[start]) % 2:
             path = [start]
@@ -252,3 +249,12 @@ def _paths(edges):
                 path.append(ahead)
             paths.append(np.array(path))
     return paths
+
+
+def _neighbours(edges):
+    """The neighbours of each vertex, by the undirected edges (e,2), a dict of sets."""
+    found = {}
+    for a, b in edges:
+        found.setdefault(a, set()).add(b)
+        found.setdefault(b, set()).add(a)
+    return found
