@@ -20,6 +20,7 @@ from .signed import signed_distance
 from .signs.sides import needed_band
 from .single.routes import boundary_of_inside
 
+_MESHES = {"none": (), "both": ("double", "single")}  # of these settings; of the others the one of that name
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said
 _SAID_OF_RAGS = (
@@ -59,10 +60,91 @@ def band_for(settings: Settings, local: LocalSurface, grid: Grid) -> float:
     return needed
 
 
+def extract_surfaces(
+    values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
+) -> Surfaces:
+    """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
+    :func:`band_for` says, and the nodes near the surface.
+
+    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
+    other and it does not show where, or sheets run side by side, or meet where samples do not show it, or samples are
+    sparse, or so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets
+    run close; then it is extracted at an offset, see :mod:`.double.double_cover`, if that is not rough, or is closer to
+    the surface.
+
+    place : function that takes positions (m,3) to the user's units, for messages
+    Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,
+    :class:`MissingDependency` where quads are asked for and OpenVDB is not found.
+    """
+    progress, kind = Progress.of(progress), settings.surface
+    if settings.faces == "quads" and kind != "none":
+        need_quads()
+    choice = Choice(values, band, local, grid, _offset(settings), progress)
+    if kind == "signed":
+        values = signed_distance(values, choice.single.sides, local, place)
+    ways = {
+        "double": lambda: _double_cover(choice),
+        "single": lambda: _single_layer(choice, beside_cover=kind == "both"),
+        "signed": lambda: _signed_surface(choice, values, progress.part(0.6, 1.0, "signed surface")),
+    }
+    meshes, dropped, warnings = {}, {}, []
+    for name in _MESHES.get(kind, (kind,)):
+        mesh, said = ways[name]()
+        mesh = mesh if settings.faces == "quads" else replace(mesh, pairs=0)
+        meshes[name], dropped[name] = without_small_pieces(mesh, settings.pieces)
+        warnings += said
+    return Surfaces(values, meshes, dropped, tuple(warnings)).placed(place)
+
+
 def _offset(settings):
     """Cells off the surface at which a double cover is extracted; of a signed surface, which hardly needs it, no more
     than the box has room for."""
     return min(settings.offset, padding_cells(settings.resolution))
+
+
+def _double_cover(choice):
+    """The double cover, and what is said of it."""
+    missed = choice.cover_fit[1]
+    return choice.cover, [_said_of_missed(missed, "double cover", "they are merged")] if missed > _SOME else []
+
+
+def _single_layer(choice, beside_cover):
+    """The single layer, or the double cover where that is torn, and what is said of it; `beside_cover` where there is a
+    double cover as well."""
+    sheet, unoriented, (worst, missed) = choice.best_single
+    if choice.is_cover_better:
+        return choice.cover, [_said_of_torn(choice.local, choice.grid)]
+    said = []
+    if missed > _SOME:
+        other = "" if beside_cover and choice.cover_fit[1] > _SOME else ", or use the double cover"
+        said.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
+    elif worst > 1 and (sheet.edges.count == 1).any():
+        said.append(_SAID_OF_RAGS)
+    if unoriented:
+        said.append(
+            f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "
+            "there, or sheets meet; use the double cover where both sides must show"
+        )
+    return sheet, said
+
+
+def _signed_surface(choice, values, progress):
+    """The boundary of the inside, from signed distances, and what is said of it."""
+    local, grid, sides, said = choice.local, choice.grid, choice.single.sides, []
+    meetings = choice.single.crossings.meetings
+    mesh = boundary_of_inside(values, meetings, local, grid, lambda: choice.extracted, progress)
+    worst, missed = misfit(mesh, local, grid.spacing)
+    if missed > _SOME:
+        said.append(_said_of_missed(missed, "signed surface", "one of them is missing"))
+    elif worst > 1 and choice.extracted_fit[0] < BETTER * worst:
+        said.append("the signed surface is torn, as where walls run closer than the grid's cells; raise the resolution")
+    if not sides.complete:
+        said.append(
+            f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "
+            f"the signed surface has a face on either side; it spans openings of {sides.spanned:.1%} of its "
+            "area; compare it with the single layer"
+        )
+    return mesh, said
 
 
 def _said_of_torn(local, grid):
@@ -85,67 +167,3 @@ def _said_of_missed(missed, mesh, how):
         f"{missed:.0%} of the points lie more than {OFF:g} cells off the {mesh}, as where sheets run closer than the "
         f"grid's cells and {how}; raise the resolution"
     )
-
-
-def extract_surfaces(
-    values, band: NearBand, local: LocalSurface, grid: Grid, settings: Settings, place, progress=None
-) -> Surfaces:
-    """The meshes that `settings.surface` names, from distances `values`, (nx,ny,nz) float32 or Blocks of the band that
-    :func:`band_for` says, and the nodes near the surface.
-
-    The double cover is both sides of the single layer, see :mod:`.double.both_sides`, unless sheets pass through each
-    other and it does not show where, or sheets run side by side, or meet where samples do not show it, or samples are
-    sparse, or so dense that chords are most of the error, of which two layers extracted apart have less, and no sheets
-    run close; then it is extracted at an offset, see :mod:`.double.double_cover`, if that is not rough, or is closer to
-    the surface.
-
-    place : function that takes positions (m,3) to the user's units, for messages
-    Raises :class:`InputError` where a signed surface is asked for and the shape is not closed,
-    :class:`MissingDependency` where quads are asked for and OpenVDB is not found.
-    """
-    progress, kind = Progress.of(progress), settings.surface
-    meshes, dropped, warnings = {}, {}, []
-    if settings.faces == "quads" and kind != "none":
-        need_quads()
-    choice = Choice(values, band, local, grid, _offset(settings), progress)
-    if kind in ("double", "both"):
-        meshes["double"] = choice.cover
-        if (missed := choice.cover_fit[1]) > _SOME:
-            warnings.append(_said_of_missed(missed, "double cover", "they are merged"))
-    if kind in ("single", "both"):
-        meshes["single"], unoriented, fit = choice.best_single
-        if choice.is_cover_better:
-            meshes["single"], unoriented = choice.cover, 0
-            warnings.append(_said_of_torn(local, grid))
-        elif (missed := fit[1]) > _SOME:
-            other = "" if kind == "both" and choice.cover_fit[1] > _SOME else ", or use the double cover"
-            warnings.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
-        elif fit[0] > 1 and (meshes["single"].edges.count == 1).any():
-            warnings.append(_SAID_OF_RAGS)
-        if unoriented:
-            warnings.append(
-                f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "
-                "there, or sheets meet; use the double cover where both sides must show"
-            )
-    if kind == "signed":
-        sides, meetings = choice.single.sides, choice.single.crossings.meetings
-        values = signed_distance(values, sides, local, place)
-        part = progress.part(0.6, 1.0, "signed surface")
-        meshes["signed"] = boundary_of_inside(values, meetings, local, grid, lambda: choice.extracted, part)
-        worst, missed = misfit(meshes["signed"], local, grid.spacing)
-        if missed > _SOME:
-            warnings.append(_said_of_missed(missed, "signed surface", "one of them is missing"))
-        elif worst > 1 and choice.extracted_fit[0] < BETTER * worst:
-            warnings.append(
-                "the signed surface is torn, as where walls run closer than the grid's cells; raise the resolution"
-            )
-        if not sides.complete:
-            warnings.append(
-                f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "
-                f"the signed surface has a face on either side; it spans openings of {sides.spanned:.1%} of its "
-                "area; compare it with the single layer"
-            )
-    for kind, mesh in meshes.items():
-        mesh = mesh if settings.faces == "quads" else replace(mesh, pairs=0)
-        meshes[kind], dropped[kind] = without_small_pieces(mesh, settings.pieces)
-    return Surfaces(values, meshes, dropped, tuple(warnings)).placed(place)
