@@ -1,6 +1,7 @@
 """The double cover: a closed two-sided mesh that hugs the surface from both sides."""
 
 from numbers import Real
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,18 +114,28 @@ def double_cover(values, band: NearBand, surface: LocalSurface, grid: Grid, offs
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
 
 
+class _IsoSurface(NamedTuple):
+    """vertices : (v,3) float64                                faces    : (f,3) or (f,4) int64
+    step     : (v,3) float64, from the foot points to these    past_rim : (v,) bool, whether the foot points are on rims
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    step: np.ndarray
+    past_rim: np.ndarray
+
+
 def _extracted(values, level, band, surface, grid, progress, before=None):
-    """Vertices and faces of the iso-surface, steps to the vertices, and whether these are past rims; for vertices that
-    it had `before`, as they were found then."""
+    """The iso-surface at a level; steps to vertices that it had `before`, as they were found then."""
     cells, faces = isosurface(values, level)
     vertices = grid.origin + grid.spacing * cells
     if before is None:
-        return vertices, faces, *first_steps(vertices, band, surface, grid, progress)
+        return _IsoSurface(vertices, faces, *first_steps(vertices, band, surface, grid, progress))
     step, past_rim, fresh = np.empty_like(vertices), np.empty(len(vertices), bool), np.ones(len(vertices), bool)
-    row, old = _shared(vertices, before[0])
-    step[row], past_rim[row], fresh[row] = before[2][old], before[3][old], False
+    row, old = _shared(vertices, before.vertices)
+    step[row], past_rim[row], fresh[row] = before.step[old], before.past_rim[old], False
     step[fresh], past_rim[fresh] = first_steps(vertices[fresh], band, surface, grid, progress)
-    return vertices, faces, step, past_rim
+    return _IsoSurface(vertices, faces, step, past_rim)
 
 
 def _shared(vertices, others):
