@@ -31,14 +31,12 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     Where sheets meet, vertices are put where the planes of their crossings meet, a cell away at most.
     """
     progress = Progress.of(progress)
-    quads, count, kind = shared_vertices(crossings, grid)
+    quads, near, meeting = shared_vertices(crossings, grid)
     corner, place = quads.reshape(-1), np.repeat(crossings.place, 4, axis=0)
-    vertices = sums_of_each(corner, place, count) / np.bincount(corner, minlength=count)[:, None]
-    meeting = kind > 0
-    step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[meeting]
-    vertices[meeting] += shortened(step, grid.spacing)
-    free = kind < 2
-    vertices = evened(vertices, quads, meeting)
+    vertices = sums_of_each(corner, place, len(near)) / np.bincount(corner, minlength=len(near))[:, None]
+    step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[near]
+    vertices[near] += shortened(step, grid.spacing)
+    vertices, free = evened(vertices, quads, near), ~meeting
     step = surface.project(vertices[free], progress.part(0.0, 0.7)).step
     vertices[free] = settled(vertices[free], step, surface, grid.spacing, progress.part(0.7, 1.0))
     mesh = _without_touches(_without_repeats(mesh_of(vertices, quads)), grid.spacing)

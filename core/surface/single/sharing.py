@@ -18,9 +18,9 @@ from ..edges.sheets import STEEP
 _BENT, _OFF = 0.3, 0.05  # crossings of a sheet are off each other's planes by this share of their distance, and cells
 
 
-def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, np.ndarray]:
-    """The vertices of each crossing's quad, in cyclic order, (e,4) int; their number; and what they are, (v,) int:
-    0 on a sheet alone, 1 near a meeting, 2 where sheets meet or one of several in a cell."""
+def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The vertices of each crossing's quad, in cyclic order, (e,4) int; which of them are near a meeting of sheets,
+    (v,) bool; and which of those are where sheets meet, or one of several in a cell, (v,) bool."""
     cell, corner = numbered(crossings.cells_around(grid).reshape(-1))
     owner = np.repeat(np.arange(len(crossings.node)), 4)
     near = (crossings.normal != 0).any(axis=1)[owner]
@@ -53,8 +53,7 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, int, 
     home = np.zeros(vertex.max(initial=-1) + 1, np.int64)
     home[vertex] = corner
     several = np.bincount(home, minlength=len(cell)) > 1
-    kind = np.where(mixed, np.where(steep | several, 2, 1), 0)[home]
-    return vertex.reshape(-1, 4), len(home), kind
+    return vertex.reshape(-1, 4), mixed[home], (mixed & (steep | several))[home]
 
 
 def _compare(crossings, a, b, cell):
