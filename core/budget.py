@@ -16,7 +16,7 @@ from .points import MINIMUM_SAMPLES
 from .settings import BESIDE_OFFSET, Settings, options
 
 _CGROUP = Path("/sys/fs/cgroup")
-FREE_SHARE = 0.7  # of the free memory, where no limit is set
+_FREE_SHARE = 0.7  # of the free memory, where no limit is set
 SUITED = 1.5  # cells between points that show their detail; see docs/scale.md
 _BAND = 4.0  # cells, the band that is advised at least
 
@@ -87,7 +87,7 @@ def check_budget(estimate: Estimate, spacing: np.ndarray, grid: Grid, settings: 
     fits."""
     limit = settings.memory_limit
     if limit == "auto":
-        limit = FREE_SHARE * free_memory_mb()
+        limit = _FREE_SHARE * free_memory_mb()
     if estimate.memory_mb <= 0.5 * limit:
         return ()
     if estimate.memory_mb <= limit:

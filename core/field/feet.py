@@ -12,7 +12,7 @@ from .grid import Grid
 from .local_surface import LocalSurface, Projection
 from .projection import FROM_NODES
 
-SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
+_SEED_BAND = 1.5  # cells, nodes whose foot points carry the distance outwards
 _AGREED = 0.02  # cells, spread of patches over which a foot point needs no second look
 _SETTLED = 0.1  # cells, residual of a foot point that counts
 _RADIUS = 0.5  # cells, a foot point stands for a disc of this radius
@@ -90,7 +90,7 @@ def settled_feet(surface: LocalSurface, grid: Grid, node, near: Projection, prog
 
     near : where the nodes fall on the surface
     """
-    seed = (near.distance <= SEED_BAND * grid.spacing) & (near.distance > _TOLD * grid.spacing)
+    seed = (near.distance <= _SEED_BAND * grid.spacing) & (near.distance > _TOLD * grid.spacing)
     node, near = node[seed], near[seed]
     feet, kept = grid.positions(node) - near.step, np.ones(len(node), bool)
     doubtful = np.flatnonzero(near.spread > _AGREED * grid.spacing)

@@ -10,7 +10,7 @@ from .grid import Grid
 from .grid_diffusion import check_held, grid_axes
 from .local_surface import LocalSurface
 
-STRIDE = 2  # the far field is solved on every second node
+_STRIDE = 2  # the far field is solved on every second node
 _ANCHOR = 50.0  # weight of a known distance, per squared cell
 _TOLERANCE = 1e-4  # of the residual, relative
 _MAX_ITERATIONS = 200
@@ -33,17 +33,17 @@ def poisson(
     """
     progress = Progress.of(progress)
     shape = grid.shape
-    known = np.pad(known, [(0, (1 - nodes) % STRIDE) for nodes in shape], constant_values=np.nan)
+    known = np.pad(known, [(0, (1 - nodes) % _STRIDE) for nodes in shape], constant_values=np.nan)
     grid = Grid(grid.origin, grid.spacing, known.shape)  # up to a coarse node on every side
-    known = known[::STRIDE, ::STRIDE, ::STRIDE]
-    coarse = Grid(grid.origin, STRIDE * grid.spacing, known.shape)
+    known = known[::_STRIDE, ::_STRIDE, ::_STRIDE]
+    coarse = Grid(grid.origin, _STRIDE * grid.spacing, known.shape)
     nodes = coarse.positions(np.arange(known.size))
     farthest, _ = surface.tree.query(nodes, workers=-1)
     if diffusion == "grid":
         start = farthest
         check_held(surface.spacing, grid, start.max())
         samples = surface.points, surface.normals, surface.spacing
-        direction = grid_axes(*samples, grid, STRIDE, progress.part(0.0, 0.5))
+        direction = grid_axes(*samples, grid, _STRIDE, progress.part(0.0, 0.5))
     else:
         found = surface.project(nodes, progress.part(0.0, 0.5))
         start, direction = found.distance, found.direction
@@ -53,7 +53,7 @@ def poisson(
     right = anchor * np.nan_to_num(known) - _divergence(direction)
     solution = _solve(anchor, right, start.reshape(known.shape), progress.part(0.5, 1.0))
     solution = np.clip(solution, 0, farthest.reshape(known.shape))
-    at = np.indices(shape, np.float32) / STRIDE
+    at = np.indices(shape, np.float32) / _STRIDE
     return map_coordinates(solution, at, order=1, mode="nearest", output=np.float32)
 
 

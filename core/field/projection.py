@@ -17,8 +17,8 @@ from .diffusion import fused_axes, kernel_weights
 NEAREST = 12  # of a query, that it is projected with
 FROM_NODES = 8  # of a node: with fewer the field errs less, though meshes more
 CHUNK = 8192  # queries at a time
-UNCOVERED = 1.5  # the surface is never further from its nearest sample than this, local spacings (or the bridged reach)
 
+_UNCOVERED = 1.5  # local spacings, or the bridged reach: the surface is never further from its nearest sample
 _PARALLEL = 0.7  # least |n . axis| of samples whose patch may cover a query
 _BESIDE = 0.3  # local spacings, at most, that a foot point lies off such a patch
 _BLEND = 0.35  # sqrt(t) of the kernels, local spacings; with the paper's, about .5, farther patches count for too much
@@ -206,7 +206,7 @@ def _onto_sheet(surface, near, anchor):
     found = np.linalg.norm(step, axis=1)
 
     own, away = near.sample[every, anchor], near.distance[every, anchor]
-    slack = np.maximum(UNCOVERED * surface.spacing[own], 1.1 * surface.rims.farthest[own])
+    slack = np.maximum(_UNCOVERED * surface.spacing[own], 1.1 * surface.rims.farthest[own])
     bounded = np.clip(found, away - slack, away)
     lifted = bounded > found
     step[lifted] = near.offset[:, every, anchor].T[lifted]

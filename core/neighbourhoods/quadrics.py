@@ -15,7 +15,8 @@ from ..records import joined
 from .clusters import Clusters
 
 GAUSS = 1.4826  # standard deviations in a median absolute error
-COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
+
+_COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
 _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
 _STIFFNESS = 1e-6
@@ -140,7 +141,7 @@ def _quadrics(offset, distance, radius):
     upright = normal - np.einsum("ma,mai->mi", coefficients[:, 1:3], frame)
     squared = row_dots(upright, upright)
     step = (radius * coefficients[:, 0] / squared)[:, None] * upright
-    leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(COEFFICIENTS)[0], coefficients.shape))[:, 0]
+    leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(_COEFFICIENTS)[0], coefficients.shape))[:, 0]
     steep = np.sqrt(squared)
     height, normal = radius * np.abs(coefficients[:, 0]) / steep, upright / steep[:, None]
     return Quadrics(step, height, normal, np.minimum(leverage, 0.95), radius)
@@ -195,5 +196,5 @@ def _weighted_fit(basis, weight, height):
     moments = [np.einsum("mk->m", term) for term in weighted]
     moments += [row_dots(by_xx, x), row_dots(by_xx, y), row_dots(by_yy, x), row_dots(by_yy, y)]
     moments += [row_dots(by_xx, xx), row_dots(by_xx, xy), row_dots(by_xx, yy), row_dots(by_xy, yy), row_dots(by_yy, yy)]
-    matrix = np.stack(moments, axis=1)[:, _MOMENTS] + _STIFFNESS * np.eye(COEFFICIENTS)
+    matrix = np.stack(moments, axis=1)[:, _MOMENTS] + _STIFFNESS * np.eye(_COEFFICIENTS)
     return solve_positive(matrix, np.stack([row_dots(each, height) for each in weighted], axis=1)), matrix, full

@@ -8,12 +8,12 @@ from ..linalg import row_dots
 from ..progress import Progress
 
 MAX_STEPS = 1000
-RATE = 0.1  # first step, radians
 
+_RATE = 0.1  # first step, radians
 _DECAYS = 0.9, 0.99
 _PATIENCE = 10  # steps without progress before the rate is halved
 _PROGRESS = 1e-3  # least relative fall of the energy that counts as progress
-_LAST_RATE = RATE / 100
+_LAST_RATE = _RATE / 100
 
 
 def minimise(
@@ -39,7 +39,7 @@ def minimise(
     axes = start.copy()
     axes[held] = given
     mean, square = np.zeros_like(axes), np.zeros((len(axes), 1))
-    best, lowest, mark, rate, waited, history = axes, np.inf, np.inf, RATE, 0, []
+    best, lowest, mark, rate, waited, history = axes, np.inf, np.inf, _RATE, 0, []
 
     for step in range(1, max_steps + 1):
         progress(step / max_steps)

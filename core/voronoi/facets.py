@@ -29,8 +29,8 @@ from .blocks import overlapping_blocks
 
 CLIP_RADIUS = 2.5  # local spacings
 REACH = 4.0  # local spacings, the larger of a pair's
-HEEDED = 2 * math.hypot(CLIP_RADIUS, REACH / 2)  # local spacings, radius of the balls
 
+_HEEDED = 2 * math.hypot(CLIP_RADIUS, REACH / 2)  # local spacings, radius of the balls
 _NEGLIGIBLE = 1e-9  # squared clip radii
 _JITTER = 1e-6  # local spacings
 _FINER, _STIRRED = 0.02, 1e-3  # times the spacing of a block's own; local spacings, jitter of others that much finer
@@ -122,7 +122,7 @@ def by_blocks(
     """
     progress = Progress.of(progress)
     jitter = np.random.default_rng(seed).uniform(-1, 1, points.shape) * (_JITTER * spacing)[:, None]
-    sites, radius = points + jitter, HEEDED * spacing
+    sites, radius = points + jitter, _HEEDED * spacing
     stir = jitter * (_STIRRED / _JITTER)
     blocks, done = overlapping_blocks(sites, radius, progress.part(0.0, 0.1)), 0
     blocks.sort(key=lambda block: -len(block.members))  # the largest would be worked on alone if it came last

@@ -23,10 +23,10 @@ from ...records import joined
 from ..curvature import sag
 from .walls_beside_gaps import walled
 
-GAP = np.radians(130)
 DISC = 1.0  # radius the patch of a sample covers where it has neighbours, local spacings
 RIM = 0.25  # how far the sheet goes on past the last samples, local spacings
-OPPOSITE = float(np.cos(GAP / 2))  # least cosine, to the direction opposite to a gap, of what lies there
+_GAP = np.radians(130)  # without neighbours, in the tangent plane, that a gap has at least
+OPPOSITE = float(np.cos(_GAP / 2))  # least cosine, to the direction opposite to a gap, of what lies there
 _BRIDGED = 0.6  # share of a bridged gap that the patch on either side covers
 
 _FLAT = 0.7  # least |n_i . n_j| of neighbours that lie on without a fold
@@ -105,7 +105,7 @@ def _find_rims(part, cloud, bend, bridge):
     ends = np.einsum("nea,nai->nei", np.take_along_axis(place, bounding[..., None], axis=1), frames)
     beside = np.take_along_axis(neighbours, bounding, axis=1)
 
-    gap = (width > GAP) & same.any(axis=1)
+    gap = (width > _GAP) & same.any(axis=1)
     distance = np.full(len(gap), np.inf)
     rows = np.flatnonzero(gap)
     distance[rows], other = across_gaps(part.start + rows, outward[rows], cloud, bridge, bend=bend)

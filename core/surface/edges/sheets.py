@@ -25,7 +25,7 @@ _LIKELY = 0.6  # least confidence of samples of such sheets beside the first
 _SAME_ANGLE, _SAME_FOOT = 0.9, (0.25, 0.1)  # cosine; cells or local spacings, whichever is more
 STEEP = 0.92  # largest |n . n'| of sheets that meet; others run side by side
 _LEVEL = 0.83  # least cosine between the normals of a sheet near a node and of samples on it
-ALIKE = 0.6  # least cosine between the axes of one sheet at neighbouring nodes
+_ALIKE = 0.6  # least cosine between the axes of one sheet at neighbouring nodes
 _BENT, _OFF = 0.35, 0.1  # its feet are off each other's plane by this share of their distance and this many cells
 
 
@@ -87,7 +87,7 @@ def one_sheet(sheets: Sheets, a, b, cell: float) -> tuple[np.ndarray, np.ndarray
     cosine = np.abs(row_dots(*axes))
     off = np.maximum(*(np.abs(row_dots(gap, axis)) for axis in axes))
     limit = _BENT * np.linalg.norm(gap, axis=1) + _OFF * cell
-    return (cosine > ALIKE) & (off <= limit), off / cell + 1 - cosine
+    return (cosine > _ALIKE) & (off <= limit), off / cell + 1 - cosine
 
 
 def _sheets_of(surface, x, part, cell):
