@@ -21,12 +21,13 @@ _TOGETHER, _SHIFTED = 0.02, 0.04  # of pairs in one cell at most, and at least w
 
 
 def cells_of_means(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> float | None:
-    """The side of the cells along the axes that samples (n,3) with local spacing (n,) are one each of, in the units of
-    both; None where there are none.
+    """The side of the cells, if each of the samples (n,3) with local spacing (n,) is the mean of the points that lay in
+    one cell of a grid along the axes, in the units of both; None where they are no such means.
 
-    Means keep away from the walls of their cells, so their coordinates have a wave along all three axes; cells of that
-    length are placed where the fewest neighbours share one. Of means hardly any do there, and many half a cell aside;
-    scattered samples do in both places, those of a lattice, which :mod:`.voxels` finds, in neither.
+    Means keep away from the walls of their cells, so their coordinates show a wave of one length along all three axes.
+    Cells of that length are placed where the fewest neighbours share one. Hardly any two means share a cell there, and
+    many do if the cells are moved aside by half a side. Scattered samples share cells in both places, and those of a
+    lattice, which :mod:`.voxels` finds, in neither.
     """
     rows = some_samples(points, min(_LOOKED_AT, len(points)), seed)
     here = points[rows]

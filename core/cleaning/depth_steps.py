@@ -51,10 +51,13 @@ class Frame:
 
 
 def find_frame(points: np.ndarray) -> Frame | None:
-    """The frame of a depth camera at the origin that points (n,3), input units, are in steps of; None where they are
-    none. They are where a coordinate of one sign takes few values, gaps between one over these are even, and far evener
-    than between the values themselves, as those of contours and slices are, and samples seen from the origin are as
-    far apart as pixels, and share their depth with those all around, not along lines alone."""
+    """The frame of a depth camera at the origin whose steps of depth points (n,3), input units, lie in; None where they
+    lie in none. They do where one coordinate has one sign and takes few values, and
+
+    - gaps between one over these values are even, far more so than gaps between the values themselves, which are even
+      in contours and slices;
+    - seen from the origin, points are a pixel apart, and share their depth with others all around, not along lines.
+    """
     for axis, depth in enumerate(points.T):
         levels = np.unique(np.abs(depth))
         if len(levels) < _LEVELS or len(points) < _ON_EACH * len(levels) or depth.min() * depth.max() <= 0:
@@ -73,9 +76,12 @@ def find_frame(points: np.ndarray) -> Frame | None:
 
 
 def between_steps(points: np.ndarray, progress=None) -> tuple[np.ndarray, Frame | None]:
-    """Points (n,3), input units, moved off the steps of the frame that they are, and that frame; the very array given
-    and None where they are none. No point moves by more than two steps, nor to more than twice its depth; one at the
-    origin, where cameras put pixels that they see nothing in, stays."""
+    """Points (n,3), input units, moved off the steps of depth that they lie in, and the frame of these; the very array
+    given and None where they lie in none.
+
+    No point moves by more than two steps, nor to more than twice its depth; one at the origin, where cameras put pixels
+    that they see nothing in, stays.
+    """
     row = np.flatnonzero(points.any(axis=1))
     frame = find_frame(points[row])
     if frame is None:

@@ -21,9 +21,9 @@ _SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where 
 
 
 def detached_clouds(around: Surroundings, progress: Progress) -> np.ndarray:
-    """(n,) bool: which samples are in a small part of their own that is neither a sheet, be it a noisy one, nor the
-    shell of a convex body, or so sparse that its few samples do not tell; but for parts that others lie beside, hardly
-    further away than their own samples."""
+    """(n,) bool: which samples are in a small part of their own that shows no surface: it is neither a sheet, be it a
+    noisy one, nor the shell of a convex body, or it is sparse and of too few samples to tell. Parts with others beside
+    them, hardly further away than their own samples, are left in."""
     part = _parts(around)
     size = np.bincount(part)
     fewest, times = _SCANTY

@@ -47,7 +47,8 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
     in places. Nothing is noisy where samples show two sheets that are hardly farther apart than the noise would be, see
     :mod:`.thin_walls`, or that they lie on flat faces, see :mod:`.flat_patches`.
 
-    Samples of `voxels` lie in layers, which show neither of that; these are noisy around stairs as well.
+    Samples of `voxels` always lie in layers and on flat faces, so neither is asked of them; they are noisy around
+    stairs as well.
     """
     clean = np.zeros(len(points), bool)
     if len(points) < _FEWEST:
@@ -68,9 +69,10 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
 
 
 def _seems_only(points, spacing, anchors, amid, level, seed, progress):
-    """Whether samples that seem to have noise of `level` local spacings at some anchors are free of it: those of thin
-    walls, or on flat faces, and not of two scans that are shifted against each other, nor means of cells as wide as
-    the sheets are apart. Flat faces are asked for `amid` these alone: beside noise a smooth surface looks flat."""
+    """Whether samples that seem to have noise of `level` local spacings at some anchors have none. Those that show two
+    sheets do, as of thin walls, unless these are two scans shifted against each other, or means of cells as wide as the
+    sheets are apart; others do where they lie on flat faces. These are looked for at the anchors `amid` alone: beside
+    noise a smooth surface looks flat."""
     sheets = two_sheets(points, spacing, anchors, level, progress)
     if sheets is None:
         return shows_flat_patches(points, spacing, amid, level)
@@ -80,9 +82,9 @@ def _seems_only(points, spacing, anchors, amid, level, seed, progress):
 
 
 def _noisy_anchors(points, spacing, found, voxels, seed, progress):
-    """Which anchors are noisy, (m,) bool: of voxels those around stairs; by how rough they are and how far normals
-    agree all, where the cloud is as a whole, and then those of its parts; each with a slice of the progress for a
-    closer look."""
+    """Yields anchors that may be noisy, (m,) bool, each time with a slice of the progress for a closer look at them: of
+    voxels those around stairs; all, where the cloud is noisy as a whole; and those in its noisy parts. The latter two
+    are told by how rough they are and how far normals agree."""
     if voxels is not None:
         yield _around_stairs(found, voxels), progress.part(0.0, 0.0)
     if found.whole:

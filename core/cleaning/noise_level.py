@@ -40,13 +40,16 @@ class Noise:
 
 
 def estimate_noise(points, seed: int = 0, progress=None, noisy=None, least: float = 0.0) -> Noise:
-    """Noise level and best neighbourhood of samples (n,3), n > 12; for those marked in `noisy`, (n,) bool, where given;
-    the level is known to be `least`, at least: terraces of voxels show less to neighbourhoods as small as they are.
+    """Noise level and best neighbourhood of samples (n,3), n > 12.
+
+    noisy : (n,) bool, samples that say which level is typical, or None for all
+    least : level that is known to be there, units of the samples: neighbourhoods as small as the terraces of voxels see
+            less of it
 
     A quadric through the k nearest, within a radius r, misses the sample that it leaves out by the noise, but for the
     share f = (1.47 level / r)^1.5 that it follows, and by what it cannot bend to. The level is read off the smallest
-    neighbourhood wide enough to see most of the noise. Of the square of what a fit misses, the rest is bent away; that
-    may come out negative, as it is its growth that tells, unless the level is the least. Every region takes the
+    neighbourhood wide enough to see most of the noise. The rest of the square of what a fit misses is what it cannot
+    bend to; this may come out negative, as only its growth tells, unless the level is the least. Every region takes the
     neighbourhood of least risk, the squared error that is expected of its quadric (after C. Stein, Annals of Statistics
     9(6), 1981):
 

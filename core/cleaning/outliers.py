@@ -47,9 +47,13 @@ def find_outliers(points, progress=None) -> np.ndarray:
       convex body, or that is sparse and of too few samples to tell; with no others hardly further away than its own;
     - hovering, in a cloud with some strays of the other kinds: far off its neighbours' quadric where they are not.
 
-    A sample with others around at its own height is neither proud nor hovering: it is in a sheet close beside another.
-    Nor is one of these, or beside a surface, that is in a sparse sheet behind a dense one, where most that seem so are,
-    or the tip of a cone or the pole of a sphere whose vertices lie on rings. None hovers where sheets cross.
+    Some only look like that, and stay:
+
+    - samples with others around at their own height, in a sheet close beside another: neither proud nor hovering;
+    - samples where sheets cross: not hovering;
+    - samples of a sparse sheet behind a dense one, if most that seem to be beside a surface or proud are of such: none
+      of the three;
+    - tips of cones and poles of spheres whose vertices lie on rings: none of the three.
     """
     progress = Progress.of(progress)
     stray = np.zeros(len(points), bool)

@@ -66,8 +66,8 @@ def _standing_out(around, found, height, times):
 
 
 def _in_no_sheet(around, found):
-    """Which of the samples `found` lie in no sheet of their own close beside another one: in one, samples around are at
-    their height above the flattest neighbourhood near them."""
+    """Which of the samples `found` lie in no sheet of their own close beside another one. Those that do have others
+    around at their own height, over the flattest neighbourhood near them."""
     count, fewest, off = _AT_ITS_HEIGHT
     row = np.flatnonzero(found)
     points, near = around.points, around.neighbours[row, 1:]

@@ -19,11 +19,12 @@ _TWICE = np.array([1, 1, 1, 2, 2, 2])  # how often a product of two components s
 
 
 def two_sheets(points, spacing, anchors, level: float, progress=None) -> tuple[np.ndarray, np.ndarray] | None:
-    """Half the distances (w,) of two sheets that samples (n,3) show, sharply, where they seem to have noise of `level`
-    local spacings, which would spread them about one sheet; and normals (w,3) there. None where they show none.
+    """Half the distances (w,) between two sheets, and normals (w,3), at those anchors around which samples (n,3) lie
+    sharply on one sheet or the other, as those of thin walls do; None where too few are like that.
 
     points  : (n,3) float64, n > 32     spacing : (n,) float64, local spacing, same units
     anchors : (m,) int, rows that look noisy
+    level   : local spacings, of the noise that they seem to have, which would spread them about one sheet
     """
     fits = nested_residuals(points, anchors, [k for k in _SIZES if k < len(points)], progress)
     around = KDTree(points[anchors]).query(points[anchors], k=min(_AROUND, len(anchors)), workers=-1)[1]

@@ -40,8 +40,8 @@ class Voxels:
 
     @cached_property
     def side(self) -> float:
-        """The length of the longest edge; where no two samples are above each other along one of the edges, of that:
-        heights over a grid are rounded alone."""
+        """The length of the edge along which samples are off the surface: of the longest, or where no two samples are
+        above each other along one edge, of that: in a grid of heights these alone are rounded."""
         length = np.linalg.norm(self.edges, axis=1)
         above = [len(np.unique(np.delete(self.place, k, axis=1) @ _NUMBERED[:2])) for k in range(3)]
         return float(length[np.argmax(above)] if max(above) == len(self.place) else length.max())
@@ -78,10 +78,11 @@ class Voxels:
 
 
 def find_voxels(points, seed: int = 0) -> Voxels | None:
-    """The voxels that samples (n,3), n > 1, are of; None where they are of none.
+    """The voxels that samples (n,3), n > 1, are the centres or corners of; None where they are of none, or of voxels
+    smaller than a quarter of their local spacing.
 
-    The three shortest offsets between neighbours that are independent, and recur, span the lattice that these lie on,
-    if they lie on any; then the others are whole numbers of them.
+    The three shortest offsets between neighbours that are independent, and recur, span the lattice that samples lie on,
+    if they lie on any; then the other offsets are whole numbers of them.
     """
     rows = some_samples(points, min(_LOOKED_AT, len(points)), seed)
     beside = k_nearest(KDTree(points), points[rows], _NEAREST + 1)[1][:, 1:]

@@ -92,7 +92,8 @@ def fit_quadrics(points, rows, neighbours: int, progress=None, clusters: Cluster
 
 
 def quadrics_at(points, places, neighbours: int, progress=None) -> Quadrics:
-    """The same at places (m,3) that are none of the points: heights are as they are, not to be :meth:`left_out`."""
+    """The same at places (m,3) that are none of the points. These have no part in their quadrics, so distances to them
+    are the heights; :meth:`Quadrics.left_out` is for samples alone."""
     (found,) = _through(points, places, (neighbours,), _quadrics, progress)
     return found
 
