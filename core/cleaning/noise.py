@@ -69,10 +69,10 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
 
 
 def _seems_only(points, spacing, anchors, amid, level, seed, progress):
-    """Whether samples that seem to have noise of `level` local spacings at some anchors have none. Those that show two
-    sheets do, as of thin walls, unless these are two scans shifted against each other, or means of cells as wide as the
-    sheets are apart; others do where they lie on flat faces. These are looked for at the anchors `amid` alone: beside
-    noise a smooth surface looks flat."""
+    """Whether samples that seem to have noise of `level` local spacings at some anchors have none. Where they show
+    two sheets, as of thin walls, they have none unless these are two scans shifted against each other, or means of
+    cells as wide as the sheets are apart; elsewhere they have none if they lie on flat faces. Those are looked for at
+    the anchors `amid` alone: beside noise a smooth surface looks flat."""
     sheets = two_sheets(points, spacing, anchors, level, progress)
     if sheets is None:
         return shows_flat_patches(points, spacing, amid, level)

@@ -15,7 +15,10 @@ PADDING = 0.125  # of the object's longest side, on every side
 
 @dataclass(frozen=True)
 class Grid:
-    """Nodes ``origin + spacing * (i,j,k)``, 0 <= (i,j,k) < shape."""
+    """Nodes ``origin + spacing * (i,j,k)``, 0 <= (i,j,k) < shape.
+
+    origin : (3,) float64     spacing : float, one cell     shape : (nx,ny,nz), nodes along each axis
+    """
 
     origin: np.ndarray
     spacing: float

@@ -231,10 +231,15 @@ def _within(bridge, n):
 
 
 def across_gaps(rows, outward, cloud: Cloud, bridge: float, spacing=None, step_up=_STEP, most=None, bend=None):
-    """The nearest sample of the sheet across the gap of each sample in `rows` (m,), up to `bridge` times its local
-    spacing, or `spacing` (m,) where given, away and off the tangent plane, or the patch that `bend` (n,3,3) says where
-    given, by less than the share `step_up` of that: its distance (m,), inf where there is none, and its number (m,).
-    Looks at the `most` nearest samples where given."""
+    """The nearest sample of the same sheet across the gap of each sample in `rows` (m,): its distance (m,), inf where
+    there is none, and its number (m,).
+
+    outward : (m,3) unit, the ways across     bridge : how far away it may be, in units of `spacing`
+    spacing : (m,), or None for the local spacing of the samples
+    step_up : share of the distance, by which either may be off the tangent plane of the other
+    most    : how many of the nearest samples are looked at, or None for all that may be in reach
+    bend    : (n,3,3) of the patches, or None: either may lie on the patch of the other, too
+    """
     points, normals = cloud.points, cloud.normals
     spacing = cloud.spacing[rows] if spacing is None else spacing
     distance, other = cloud.tree.query(points[rows], k=min(_within(bridge, len(cloud)), most or len(cloud)))

@@ -21,8 +21,9 @@ _AROUND = 1.0  # cells, samples this close to one count as well
 
 
 def beside_within_cells(band: NearBand, surface: LocalSurface, grid: Grid) -> np.ndarray:
-    """Which samples are on sheets with another side by side, (n,) bool: close to those that go with both ends of grid
-    edges whose feet, off the rims, are on parallel planes half a cell apart or more."""
+    """Which samples are on sheets with another one side by side, (n,) bool. Grid edges tell them, both ends of which
+    have their feet off the rims, on parallel planes half a cell apart or more: the samples of these ends, and all
+    within a cell of such a sample."""
     dense = surface.spacing <= _DENSE * grid.spacing
     if not dense.any():
         return dense

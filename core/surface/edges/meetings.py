@@ -43,7 +43,7 @@ _PASSING = 24  # samples around one, with such a sample among which it is close 
 class Meetings:
     """Samples in whose neighbourhood there are several sheets.
 
-    at      : (n,) bool
+    at      : (n,) bool, all of them
     through : (n,) bool, samples whose sheet passes through another one; nearly all are marked in `at`, too
     beside  : (n,) bool, those at meetings with another sheet that runs side by side with theirs
     passing : (n,) bool, all samples close to lines along which sheets pass through one another

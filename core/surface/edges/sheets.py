@@ -117,7 +117,8 @@ def _on_sheet(node, x, near, anchor):
 
 
 def _distinct(sheets, surface, cell):
-    """By node, of one node in their order, without what says of it the same as a pair before."""
+    """The pairs by ascending node, those of one node in the order given, but for pairs whose sheet an earlier pair of
+    the node has already."""
     order, first = grouped(sheets.node)
     axis, foot = sheets.axis[order], sheets.foot[order]
     spacing = surface.spacing[sheets.sample[order, sheets.anchor[order]]]
@@ -137,7 +138,7 @@ def _distinct(sheets, surface, cell):
 
 
 def _told(sheets, surface, x, cell, towards):
-    """What the neighbours of nodes do not know of the nodes' sheets, as pairs of the neighbours."""
+    """The sheets that nodes (m,) know and their neighbours, the rows `towards` (m,), do not: as pairs of these."""
     first, count = sheets.span(len(x))
     pair = np.flatnonzero((towards[sheets.node] >= 0) & (sheets.beyond <= cell))
     node = towards[sheets.node[pair]]

@@ -18,8 +18,9 @@ _INTO, _INTO_LINES = 1.5, 6.0  # cells, how far a vertex may go into a crease, a
 
 def finished(mesh: Mesh, passing: np.ndarray, surface: LocalSurface, cell: float, progress: Progress) -> Mesh:
     """The mesh with sharp creases, see :func:`sharpened`, without the folds that these and lines may make, see
-    :func:`unfolded`, with its faces astride the surface, see :func:`centred`, and without those that pass through
-    others, see :func:`untangled`; what these leave blunt is made sharp once more, where none do then."""
+    :func:`unfolded`, with its faces astride the surface, see :func:`centred`, and without faces that pass through
+    others, see :func:`untangled`. Around vertices that the last moved creases are made sharp once more, unless faces
+    pass through others then."""
     sharp = sharpened(mesh, passing, surface, cell, progress.part(0.0, 0.6))
     mesh = centred(unfolded(sharp, surface, cell, held=(sharp.vertices != mesh.vertices).any(axis=1)))
     loose = untangled(mesh, surface, ~_passing(mesh.vertices, passing, surface))

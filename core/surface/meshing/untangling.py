@@ -46,8 +46,8 @@ def taken_back(mesh: Mesh, before: np.ndarray) -> Mesh:
 
 def _without_crossings(mesh, before, asked, smooth):
     """The mesh with vertices of faces that cross, one of which has a vertex `asked`, (v,) bool, moved in rounds: by
-    `smooth` or, where that is None, to where they were `before`, (v,3). Where it fails, there are those, too, that were
-    moved in the last round."""
+    `smooth` or, where that is None, to where they were `before`, (v,3). Where faces cross after the last round,
+    vertices around go there in any case."""
     if not asked.any():
         return mesh
     near = mesh.faces_at(mesh.around(asked, _AROUND - 1))

@@ -253,8 +253,9 @@ def _sides(edges: Iterable, n, outside, progress):
 
 
 def _without_specks(inside, beside, surface, grid):
-    """With connected sets of less than _SPECK nodes on one side turned over, but for those with a node whose nearest
-    sample is marked in `beside` (n,), if they are few of that side: thin walls and slits hold no more nodes."""
+    """The inside with specks turned over: connected sets of less than _SPECK nodes on one side. Those with a node whose
+    nearest sample is marked in `beside` (n,) stay, if they are few of the nodes on their side: thin walls and slits
+    hold no more."""
     for side in (True, False):
         part, _ = regions(each(lambda here: here == side, inside))  # noqa: B023  called at once
         size = counts(part)

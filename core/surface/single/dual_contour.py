@@ -24,7 +24,7 @@ _STIFFNESS = 0.05  # of vertices where sheets meet
 
 
 def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
-    """Dual contouring of the zero set (Ju et al., ACM TOG 21(3), 2002), by the edges its two sides are told apart on.
+    """Dual contouring of the zero set (Ju et al., ACM TOG 21(3), 2002), by the grid edges that it crosses.
 
     Every cell that the surface passes has one vertex, the mean of its crossings, evened and taken to its foot point,
     but one for each sheet where sheets run close (see :mod:`.sharing`); every crossing has one quad, split in two.

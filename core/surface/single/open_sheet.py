@@ -50,8 +50,8 @@ def open_sheet(
 
 
 def _trimmed(vertices, faces, band, surface, grid, progress):
-    """Without the faces whose middle is off the surface, if they are connected to ones that are far off; where one is
-    gone, vertices are in the middle of the others' foot points."""
+    """The vertices and faces but for faces whose middle is off the surface, if they are connected to ones far off it.
+    Vertices that such faces had are put in the middle of the foot points of their faces that are left."""
     step, past_rim = first_steps(vertices, band, surface, grid, progress.part(0.0, 0.5))
     limit, middle = _COVERED * grid.spacing, vertices[faces].mean(axis=1)
     row = np.flatnonzero((past_rim | (np.linalg.norm(step, axis=1) > limit))[faces].any(axis=1))

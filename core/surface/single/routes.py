@@ -118,12 +118,14 @@ def sheet_of_crossings(
 ) -> tuple[Mesh, int]:
     """Any surface as one sheet by :func:`dual_contour`, with edges of several faces where sheets meet.
 
-    Where a surface with two sides passes through itself, what lies between them turns off just before the crossing on
-    either side, may have handles where samples are sparse, and tears where the line ends; so it is taken only if
-    samples do not show the line, and the dual contour cannot be wound alike wherever it has two faces, and does not end
-    along the line, as where sheets meet. Creases may look like sheets that meet for some cells; so it is taken in place
-    of a dual contour all of whose lines are short, too, if it is wound alike, and has no such lines and no borders in
-    their place. Where sheets run side by side all may be torn; then see :func:`_of_torn`.
+    In two cases what lies between two sides may take its place, see :func:`open_sheet`, if there are such:
+
+    - The dual contour is wound alike, and all its lines of more than two faces are short: creases may look like sheets
+      that meet for some cells. The other is taken if it is wound alike, too, and has no lines nor borders there.
+    - The dual contour cannot be wound alike wherever it has two faces, and samples do not show its lines. The other is
+      taken if it has few borders along them, as it has where it parts sheets that meet. Where samples show the lines it
+      is not, as at a crossing it turns off just before that on either side, may have handles where samples are sparse,
+      and tears where the line ends. Where sheets run side by side all may be torn; then see :func:`_of_torn`.
 
     two_sides, cover : functions that give the signed distances of :func:`two_sided`, and the double cover
     between          : what lies between the two sides there, which may be torn

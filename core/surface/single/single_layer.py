@@ -132,10 +132,13 @@ class SingleLayer:
         return self.meetings.side_by_side and self.misfit[0] > ROUGH
 
     def told_apart(self) -> "SingleLayer":
-        """This, or where it is rough, the one with sheets told apart by their room: if its misfit is less than half of
-        this one's; or if it is less at all, shows more of the samples, and is torn (of a misfit above 1) only where
-        this is, too: a torn one has the double cover to stand in for it. It never takes the place of what lies between
-        two sides, which has no lines of more than two faces; it may have some, along creases."""
+        """This, or where it is rough the one with sheets told apart by their room, if that is better:
+
+        - its misfit is less than half of this one's; or
+        - it is less at all, it shows more of the samples, and both are torn (of a misfit above 1) or neither is.
+
+        It never takes the place of what lies between two sides. That has no lines of more than two faces, and it may
+        have some along creases."""
         if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))

@@ -19,9 +19,9 @@ _SMALL = 0.002  # of the area of the cover, smaller pieces are not looked at
 
 
 def with_thin_walls(sheet: Mesh, unoriented: int, cover: Mesh, surface: LocalSurface, cell: float) -> tuple[Mesh, int]:
-    """A single layer, with `unoriented` edges across which it is not wound alike, with pieces of a double cover
-    extracted at an offset in place of what it has there, where these go around thin walls, each sheet of which they
-    show once, and are closer to the surface; and the number of such edges then.
+    """A single layer with pieces of a double cover extracted at an offset, and the number of its edges across which it
+    cannot be wound alike, which is `unoriented` without them. A piece takes the place of what the layer has there where
+    it goes around a thin wall, each sheet of which it shows once, and is closer to the surface.
 
     Between the sheets of a wall no node may lie, and so neither a side nor a crossing that parts them; a single layer
     goes to and fro between the two. The cover is around both, and is what bounds the wall.
