@@ -120,14 +120,14 @@ def _behind_others(around):
 
 def _at_tips(around, row):
     """Which of samples `row` (m,) are tips of cones and poles of rings: the nearest lie around, none in the midst."""
-    count, near, hollow = _TIP
-    distance, other = k_nearest(around.tree, around.points[row], count)
-    weight = (distance < near * distance[:, 1:2]) & (distance > 0.0)
-    towards = unit(around.points[other] - around.points[row, None])
-    count = weight.sum(axis=1)
-    midst = np.einsum("mk,mki->mi", weight.astype(float), towards) / count[:, None]
-    away = np.where(weight, 1.0 - np.einsum("mki,mi->mk", towards, midst), np.nan)
-    return (count >= NEIGHBOURS) & (np.nanmin(away, axis=1) > hollow * np.nanmax(away, axis=1))
+    asked, near, hollow = _TIP
+    distance, other = k_nearest(around.tree, around.points[row], asked)
+    ring = (distance < near * distance[:, 1:2]) & (distance > 0.0)
+    towards, count = unit(around.points[other] - around.points[row, None]), ring.sum(axis=1)
+    midst = np.einsum("mk,mki->mi", ring.astype(float), towards) / np.maximum(count, 1)[:, None]
+    away = 1.0 - np.einsum("mki,mi->mk", towards, midst)
+    least, largest = away.min(axis=1, where=ring, initial=np.inf), away.max(axis=1, where=ring, initial=-np.inf)
+    return (count >= NEIGHBOURS) & (least > hollow * largest)
 
 
 def _scattered(around, progress):

@@ -281,3 +281,10 @@ def test_strays_that_more_and_more_others_hide_are_found():
     strays = np.vstack([turn * string[:, [a, b, c]] for turn in (1, -1) for a, b, c in ((0, 1, 2), (1, 2, 0))])
     points, stray = with_strays(strays)
     np.testing.assert_array_equal(find_outliers(points), stray)
+
+
+def test_points_given_twice_are_looked_at_without_a_warning():
+    """Nothing is around such a stray in a ring as far off as its nearest, which is no way off."""
+    strays = np.random.default_rng(0).uniform(-2, 2, (10, 3))
+    once = np.concatenate([shapes.scattered_sphere(150), strays])
+    assert not find_outliers(np.tile(once, (2, 1)))[:150].any()
