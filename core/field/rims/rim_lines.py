@@ -42,24 +42,11 @@ _CHUNK = 512  # rim samples
 def with_rim_lines(rims: Rims, cloud: Cloud, progress=None) -> Rims:
     """The rims with margins up to the lines through their outermost samples, or across gaps in the sampling, and with
     patches of other samples, bridged gaps too, ended at those lines."""
-    progress, normals, spacing = Progress.of(progress), cloud.normals, cloud.spacing
-    row = np.flatnonzero(_at_rims(rims))
+    row, spacing = np.flatnonzero(_at_rims(rims)), cloud.spacing
     if not len(row):
         return rims
-
-    def lay(part):
-        return _lines(row[part], rims.outward[row[part]], cloud)
-
-    found = [lines for _, lines in in_order(lay, progress.part(0.0, 0.5).chunks(len(row), _CHUNK))]
-    usual, at_random = spacing_around(row, cloud)
-    beyond = np.where(at_random, *_BEYOND)
-    fits = (np.concatenate(each) for each in zip(*found, strict=True))
-    lines = _Lines(row, rims.outward[row], normals[row], *fits, beyond)
-    part = progress.part(0.5, 1.0)
-    gaps = find_rim_gaps(row, rims.outward[row], usual, at_random, cloud, part)
-    lines.lay_over(gaps, normals, spacing)
-    margin = rims.margin.copy()
-    size = spacing[row]
+    lines = _lines_over(row, rims.outward[row], cloud, Progress.of(progress))
+    margin, size = rims.margin.copy(), spacing[row]
     margin[row, 0] = size * lines.margin(lines.height / np.sqrt(1 + lines.slope**2))
 
     other = np.flatnonzero(~rims.open)
@@ -137,6 +124,21 @@ class _Lines:
         """Slope of lines (m,) at one place each, (m,)."""
         quadratic, right, left = self.bend[of].T
         return self.slope[of] + 2 * quadratic * along + np.where(along > 0, right, -left)
+
+
+def _lines_over(row, outward, cloud, progress):
+    """The rim lines over samples `row` (r,) with ways out of the sheet (r,3), across gaps in the sampling."""
+
+    def lay(part):
+        return _lines(row[part], outward[part], cloud)
+
+    found = [lines for _, lines in in_order(lay, progress.part(0.0, 0.5).chunks(len(row), _CHUNK))]
+    usual, at_random = spacing_around(row, cloud)
+    fits = (np.concatenate(each) for each in zip(*found, strict=True))
+    lines = _Lines(row, outward.copy(), cloud.normals[row], *fits, np.where(at_random, *_BEYOND))
+    gaps = find_rim_gaps(row, outward, usual, at_random, cloud, progress.part(0.5, 1.0))
+    lines.lay_over(gaps, cloud.normals, cloud.spacing)
+    return lines
 
 
 def _lines(row, outward, cloud):

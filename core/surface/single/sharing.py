@@ -25,21 +25,7 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, np.nd
     owner = np.repeat(np.arange(len(crossings.node)), 4)
     near = (crossings.normal != 0).any(axis=1)[owner]
     mixed = np.bincount(corner, near, len(cell)) > 0
-    order = np.argsort(corner, kind="stable")
-    count = np.bincount(corner, minlength=len(cell))
-    first = np.cumsum(count) - count
-
-    plain = order[~mixed[corner[order]]]
-    links = [(plain, order[first[corner[plain]]])]
-    steep = np.zeros(len(cell), bool)
-    for i in range(count[mixed].max(initial=0)):
-        for j in range(i + 1, count[mixed].max(initial=0)):
-            row = np.flatnonzero(mixed & (count > j))
-            a, b = order[first[row] + i], order[first[row] + j]
-            same, meet = _compare(crossings, owner[a], owner[b], grid.spacing)
-            steep[row[meet]] = True
-            links.append((a[same], b[same]))
-    sheet = connected_parts(*(np.concatenate(ends) for ends in zip(*links, strict=True)), len(corner))
+    sheet, steep = _sheets_in_cells(crossings, owner, corner, mixed, grid.spacing)
 
     at = np.flatnonzero(steep[corner])
     face, turn = _on_faces(owner[at], cell[corner[at]], crossings, grid)
@@ -54,6 +40,26 @@ def shared_vertices(crossings: Crossings, grid: Grid) -> tuple[np.ndarray, np.nd
     home[vertex] = corner
     several = np.bincount(home, minlength=len(cell)) > 1
     return vertex.reshape(-1, 4), mixed[home], (mixed & (steep | several))[home]
+
+
+def _sheets_in_cells(crossings, owner, corner, mixed, cell):
+    """The number of the sheet in its cell that each corner of a quad lies on, (c,), by the crossing `owner` (c,) and
+    the cell `corner` (c,) of each; and the cells in which sheets meet, (k,) bool, of those that are `mixed`, (k,) bool.
+    In the others there is one sheet."""
+    order = np.argsort(corner, kind="stable")
+    count = np.bincount(corner, minlength=len(mixed))
+    first = np.cumsum(count) - count
+    plain = order[~mixed[corner[order]]]
+    links = [(plain, order[first[corner[plain]]])]
+    steep = np.zeros(len(mixed), bool)
+    for i in range(count[mixed].max(initial=0)):
+        for j in range(i + 1, count[mixed].max(initial=0)):
+            row = np.flatnonzero(mixed & (count > j))
+            a, b = order[first[row] + i], order[first[row] + j]
+            same, meet = _compare(crossings, owner[a], owner[b], cell)
+            steep[row[meet]] = True
+            links.append((a[same], b[same]))
+    return connected_parts(*(np.concatenate(ends) for ends in zip(*links, strict=True)), len(corner)), steep
 
 
 def _compare(crossings, a, b, cell):
