@@ -153,6 +153,12 @@ def symmetric(weight: np.ndarray, low: np.ndarray, high: np.ndarray, n: int) -> 
     return coo_matrix((np.append(weight, weight), ends), shape=(n, n)).tocsr()
 
 
+def links_in_common(links: csr_matrix, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The sum over n items of the products of their links, sparse (n,n), to both of a pair, (m,) rows each, (m,): with
+    links of one the number of items that both are linked to."""
+    return np.asarray(links[one].multiply(links[other]).sum(axis=1)).reshape(-1)
+
+
 def conjugate_gradients(
     apply: Callable, right: np.ndarray, start: np.ndarray, precondition: Callable, tolerance: float, steps: Iterable
 ) -> np.ndarray:

@@ -45,6 +45,10 @@ class Groups:
         """(g,3) float64."""
         return middles_of(self.grid, self.corner, 2)
 
+    def to_samples(self, surface: LocalSurface) -> np.ndarray:
+        """(g,) float64, distances from the middles to those samples."""
+        return np.linalg.norm(self.middles - surface.points[self.sample], axis=1)
+
     def members(self, octant: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The nodes of the groups at an `octant` of :data:`CORNERS`: their flat indices (m,), and which group each is
         in, ascending."""

@@ -58,8 +58,7 @@ def _projected(surface, groups, progress):
     grid, reach, found = groups.grid, sample_reach(surface), []
     for rows, turn in progress.pieces(len(groups), _PIECE):
         part = groups[rows]
-        away = np.linalg.norm(part.middles - surface.points[part.sample], axis=1)
-        part = part[away <= reach[part.sample] + grid.spacing * (BAND + 2 * HALF)]
+        part = part[part.to_samples(surface) <= reach[part.sample] + grid.spacing * (BAND + 2 * HALF)]
         projected = surface.project(part.middles, turn.part(0, 0.2))
         part = part[projected.distance <= grid.spacing * (BAND + HALF + MARGIN)]
         node = np.sort(np.concatenate([part.members(octant)[0] for octant in CORNERS]))

@@ -44,7 +44,7 @@ def _held(groups, feet, surface, width, progress):
     limit = (width + 2 * HALF) * groups.grid.spacing
     for rows in progress.chunks(len(groups), _PIECE):
         part = groups[rows]
-        away = np.linalg.norm(part.middles - surface.points[part.sample], axis=1)
+        away = part.to_samples(surface)
         if count:
             middles = part.middles - groups.grid.origin
             to_feet, held[rows] = feet.tree.query(middles, np.arange(1, count + 1), workers=-1)

@@ -13,7 +13,7 @@ from scipy.sparse import csr_matrix
 
 from ...field.local_surface import LocalSurface
 from ...field.projection import MEMBER, TRUSTED, membership
-from ...linalg import cross, dots, row_dots
+from ...linalg import cross, dots, links_in_common, row_dots
 from ...lookup import mask_of, numbered
 from ...parallel import even_chunks, in_order, over_rows
 from ...parts import connected_parts
@@ -144,7 +144,7 @@ def _linked(i, j, nearest, alike, sure):
     links, found = links + links.T, np.empty(len(i), bool)
 
     def look(part):
-        found[part] = np.asarray(links[i[part]].multiply(links[j[part]]).sum(axis=1)).reshape(-1) > 0
+        found[part] = links_in_common(links, i[part], j[part]) > 0
 
     over_rows(look, len(i), _CHUNK)
     return found

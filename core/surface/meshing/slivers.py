@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...linalg import dots, lengths
+from ...linalg import dots, lengths, links_in_common
 from ...lookup import mask_of
 from ..mesh import Mesh, at_corners, face_normals
 
@@ -70,8 +70,7 @@ def _with_ends_joined(mesh, free, shortest, cell, chance):
     step = columns.take(high, axis=1) - columns.take(low, axis=1)
     short = chance.permutation(np.flatnonzero((dots(step, step) < shortest**2) & free[low] & free[high]))
     links = mesh.edges.links()
-    shared = np.asarray(links[low[short]].multiply(links[high[short]]).sum(axis=1)).reshape(-1)
-    ends = np.stack([low, high])[:, short[shared == 2]]
+    ends = np.stack([low, high])[:, short[links_in_common(links, low[short], high[short]) == 2]]
     ends = ends[:, _no_neighbours(ends, low, high, n)]
     if not ends.size:
         return mesh
