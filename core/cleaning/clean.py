@@ -11,8 +11,8 @@ from .outliers import find_outliers
 from .positions import denoise
 from .voxels import find_voxels
 
-_SOLID = 0.15  # of the samples of voxels, at least, are inside of solids; of those that surfaces meet, up to .03
-_FAR = 2.0  # times as long as the box around those kept is the one around all, at least, for cells to be told larger
+_SOLID = 0.15  # of the samples of voxels are inside, at least, of a solid; where surfaces alone meet, up to .03
+_FAR = 2.0  # sides of the box around all over that around those kept, from which on larger cells are spoken of
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:

@@ -17,7 +17,7 @@ _FACING = 0.06  # of its samples, at least, have such others
 _ENOUGH = 16  # samples, of which fewer do not tell a shell from a cloud
 _HULL = 0.95, 0.15  # so many samples this close to the convex hull, local spacings, are a shell
 _CHUNK = 8192  # samples
-_SCANTY = 40, 4.0  # samples that are too few to tell a part by, no wire, where so many times as sparse as the cloud
+_SCANTY = 40, 4.0  # fewer samples do not tell what a part is that is no wire and so many times as sparse as the cloud
 
 
 def detached_clouds(around: Surroundings, progress: Progress) -> np.ndarray:

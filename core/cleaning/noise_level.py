@@ -14,7 +14,7 @@ from .anchors import SMOOTHING, nearest_anchor, spread_anchors
 LADDER = (12, 20, 32, 50, 80, 128, 200)  # neighbours tried
 _WIDER = (320, 500, 800, 1250, 2000, 3200, 5000, 8000, 12500, 20000)  # tried one by one, where noise asks for more
 _ASKED = 0.1  # share of the regions that the widest of them serves best, above which a wider one is tried
-_PART, _MOST = 0.025, 0.1  # of the cloud, that these hold at most: more see the shape itself; where noise drowns that
+_PART, _MOST = 0.025, 0.1  # of the cloud, that these hold at most, as more see the shape; and where noise drowns that
 _WRAPPED = 0.97, 1.3  # times the level seen in the one before, outside of which they reach round the shape
 
 _SEEN = 10.0  # a fit shows nearly all of the noise once its radius is this many times its left-out error

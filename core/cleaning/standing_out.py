@@ -9,12 +9,12 @@ from ..trees import k_nearest
 from .surroundings import FEWEST, NEIGHBOURS, Surroundings
 
 _AT_ITS_HEIGHT = 24, 6, 0.15  # samples with itself; so many this close to its height, over their spacing, are a sheet
-_PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and as they are
+_PROUD = 1.2, 0.9, 8.0  # spacing over that of the neighbours; off their plane, over their spacing, and over theirs
 _FITTED = 20  # neighbours of the quadrics that heights are measured against
 _SUSPECT = 1.4  # spacing over that of the neighbours
 _HOVERING = 7.5  # distance from the quadric over the largest of the medians around each neighbour
 _FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
-_PLANES = 16, 0.15, 2  # the nearest; so close to the planes of so many of these, over their spacing, sheets cross
+_PLANES = 16, 0.15, 2  # the nearest; off their planes, over their spacing, and of how many of these where sheets cross
 
 
 def proud(around: Surroundings) -> np.ndarray:

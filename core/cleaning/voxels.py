@@ -21,7 +21,7 @@ _LOOKED_AT, _NEAREST = 300, 8  # samples, and the nearest to each, whose offsets
 _INDEPENDENT = 0.1  # volume over that of a right-angled box, at least, of offsets that span a lattice
 _WHOLE = 0.02  # steps, that an offset is off whole numbers of them, at most
 _MOST = 0.9  # of the offsets, at least, are no further off; strays have others
-_TWINS, _ALIKE = 5, 1e-3  # as many others are like an offset that spans the lattice, to so much of a typical length
+_TWINS, _ALIKE = 5, 1e-3  # others, at least, that are like an offset that spans the lattice, to this share of a length
 _COARSE = 0.25  # local spacings, the side at least
 _STEPS = np.eye(3, dtype=int)  # over the faces of a voxel
 _NUMBERED = np.array([1, 1 << 21, 1 << 42])  # times places: one number for each, two million on a side

@@ -22,7 +22,7 @@ from .sheets import SIDE_BY_SIDE
 
 NEIGHBOURS = 32
 _LINKED = 0.8  # least confidence of samples that link others
-_ASKEW = float(np.sqrt(1 - SIDE_BY_SIDE**2))  # least sine between others
+_ASKEW = float(np.sqrt(1 - SIDE_BY_SIDE**2))  # least sine of the angle between sheets that do not run side by side
 _WIDER, _CLOSE = 120, 60  # samples among which a sheet is followed, and close by where it meets another squarely
 _STRAIGHT, _FAR = 0.5, 4.0  # least membership of those it is followed over; local spacings, up to where
 _PAST = 1.0  # local spacings along itself that a sheet goes on, on either side of the other
@@ -30,12 +30,12 @@ _PARTED = 0.3  # local spacings, off the plane of one of three sheets that end a
 _THIRD = 4  # samples of the third, at least
 _LEVEL = 0.3  # volume that the normals of such sheets span, at most
 _CHUNK = 8192  # samples
-_SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood
-_WEAK, _NEXT = 0.15, 8  # the same next to such samples, and how many are
+_SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood, on two sheets where these meet
+_WEAK, _NEXT = 0.15, 8  # that share where samples connect to such ones, by so many of the nearest each
 _FEW = 0.005  # of all samples, at meetings, beside others, or that show no line: as few may be chance
-_THROUGH = 0.125  # of the samples at meetings, as many of sheets that pass through one another are no chance
-_BESIDE = 0.05  # the same, more than so many, of samples beside another sheet
-_LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all these, at least
+_THROUGH = 0.125  # of the samples at meetings: as many on sheets that pass through one another are no chance
+_BESIDE = 0.05  # of the samples at meetings: more beside another sheet tear single layers
+_LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all around, at least
 _PASSING = 24  # samples around one, with such a sample among which it is close to the line
 
 
