@@ -53,11 +53,15 @@ class Mesh:
         vars(mesh)["edges"] = self.edges
         return mesh
 
-    def of_faces(self, kept: np.ndarray, paired: np.ndarray | None = None) -> "Mesh":
-        """The mesh of the faces marked in `kept`, (f,) bool, in the same order. A quad stays one where both its halves
-        do and it is marked in `paired`, (pairs,) bool or None for all."""
-        halves = kept[: 2 * self.pairs].reshape(2, -1)
-        whole = halves.all(axis=0) if paired is None else halves.all(axis=0) & paired
+    def of_faces(self, kept: np.ndarray) -> "Mesh":
+        """The mesh of the faces marked in `kept`, (f,) bool, in order; quads stay such where both their halves do."""
+        return self._of(kept, kept[: 2 * self.pairs].reshape(2, -1).all(axis=0))
+
+    def with_quads(self, whole: np.ndarray) -> "Mesh":
+        """The mesh with only those of its quads that are marked in `whole`, (pairs,) bool; others are two triangles."""
+        return self._of(np.ones(len(self.faces), bool), whole)
+
+    def _of(self, kept, whole):
         rest = kept.copy()
         rest[: 2 * self.pairs] &= ~np.tile(whole, 2)
         first = np.flatnonzero(whole)

@@ -29,7 +29,7 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
     sides = _sides(sheet)
     whole = sides.whole_quads(sheet.pairs)
     if not whole.all():
-        sheet = sheet.of_faces(np.ones(len(sheet.faces), bool), whole)
+        sheet = sheet.with_quads(whole)
         sides = _sides(sheet)
     place = np.empty(sides.vertex.max(initial=-1) + 1, sheet.faces.dtype)
     place[sides.vertex] = sheet.faces

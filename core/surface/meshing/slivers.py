@@ -154,7 +154,7 @@ def _with_sides_turned(mesh, free, cell):
     for face, each in zip((row, other), turned, strict=True):
         faces[face[can]], whole[face[can]] = each[can], False
     paired = whole[: 2 * mesh.pairs].reshape(2, -1).all(axis=0)
-    return replace(mesh, faces=faces).of_faces(np.ones(len(faces), bool), paired)
+    return replace(mesh, faces=faces).with_quads(paired)
 
 
 def _alike(before, after, cell):

@@ -72,4 +72,4 @@ def _with_turned(mesh, turned):
     row = np.arange(len(faces))
     row[: 2 * mesh.pairs] += np.concatenate([first & second] * 2) * np.repeat([mesh.pairs, -mesh.pairs], mesh.pairs)
     faces = np.where(turned[:, None], faces[:, [0, 2, 1]], faces)[row]
-    return replace(mesh, faces=faces).of_faces(np.ones(len(faces), bool), first == second)
+    return replace(mesh, faces=faces).with_quads(first == second)

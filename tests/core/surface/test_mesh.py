@@ -83,7 +83,7 @@ def test_a_quad_that_loses_a_half_is_a_triangle(gone, quads, triangles):
 
 
 def test_quads_that_are_not_to_be_are_triangles():
-    found = STRIP.of_faces(np.ones(5, bool), np.array([False, True]))
+    found = STRIP.with_quads(np.array([False, True]))
     assert found.quads.tolist() == [[1, 2, 5, 4]]
     assert found.triangles.tolist() == [[0, 1, 4], [0, 4, 3], [2, 6, 5]]
 
