@@ -36,6 +36,19 @@ def finite_points(given, least: int = 0) -> np.ndarray:
     return points
 
 
+def span_of(points: np.ndarray, powers: str, least: float, most: float) -> float:
+    """Longest side of the box around points (n,3), their units. Raises :class:`InputError` where it is not between
+    `least` and `most`, as `powers` of distances that are worked with, named in the message, need."""
+    with np.errstate(over="ignore"):
+        span = float(np.ptp(points, axis=0).max())
+    if not least <= span <= most:
+        raise InputError(
+            f"the points span {span:g}; {powers} need a span from {least:g} to {most:g}, so scale them to an ordinary "
+            "size"
+        )
+    return span
+
+
 def spacing_of(points: np.ndarray, given) -> np.ndarray:
     """Local spacing (n,) float64 of points (n,3). Raises :class:`InputError` for another shape, and for what is not
     above 0 and finite."""

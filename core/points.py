@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from .errors import InputError
-from .given_arrays import finite_points, points_array
+from .given_arrays import finite_points, points_array, span_of
 from .near_duplicates import find_near_duplicates
 from .progress import Progress
 from .spatial_order import spatial_order
@@ -101,14 +101,8 @@ def prepare_samples(points, progress=None) -> Samples:
 
 def _framed(given, source_index, warnings):
     """Samples in the unit frame of their own bounding box."""
+    scale = span_of(given, "distances in single precision", _SMALLEST, _LARGEST)
     low, high = given.min(axis=0), given.max(axis=0)
-    with np.errstate(over="ignore"):
-        scale = float((high - low).max())
-    if not _SMALLEST < scale < _LARGEST:
-        raise InputError(
-            f"the points span {scale:g}; distances in single precision need a span from {_SMALLEST:g} to {_LARGEST:g}, "
-            "so scale them to an ordinary size"
-        )
     centre = low + (high - low) / 2
     points = np.rint((given - low - (high - low) / 2) / (scale * _QUANTUM)) * _QUANTUM  # the centre is rounded
     distinct = first_of_each(points, np.arange(len(points)))

@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..errors import InputError
-from ..given_arrays import finite_points, spacing_of
+from ..given_arrays import finite_points, spacing_of, span_of
 from ..linalg import COMPONENTS
 from ..neighbourhoods.close_sheets import sheet_room
 from ..neighbourhoods.cloud import Cloud
@@ -97,12 +96,7 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     fourth powers of, :class:`SettingsError` for a bridge outside its limits."""
     bridge = Settings(bridge=bridge).bridge
     progress, points = Progress.of(progress), finite_points(points, least=2)
-    span = float(np.ptp(points, axis=0).max())
-    if not _SMALLEST < span < _LARGEST:
-        raise InputError(
-            f"the points span {span:g}; powers of distances in single precision need a span from {_SMALLEST:g} to "
-            f"{_LARGEST:g}, so scale them to an ordinary size"
-        )
+    span_of(points, "powers of distances in single precision", _SMALLEST, _LARGEST)
     normals, confidence = known_normals((normals, confidence), len(points), slice(None))
     spacing = spacing_of(points, spacing)
     given = points, normals, confidence, spacing, np.arange(len(points))

@@ -180,3 +180,8 @@ def test_coordinates_that_single_precision_rounded_are_told(shift, told):
 def test_whole_numbers_look_rounded_only_where_these_are_the_steps(far, told):
     points = np.stack(np.meshgrid(*[np.arange(8.0)] * 3), axis=-1).reshape(-1, 3) + far
     assert bool(rounding_warning(points, 1.0)) == told
+
+
+def test_outliers_are_not_looked_for_where_powers_of_distances_overflow():
+    with pytest.raises(InputError, match=r"the points span 1.99.*e\+200; powers of distances need a span from 0 to 1e\+100"):
+        remove_outliers(1e200 * shapes.sphere(150))
