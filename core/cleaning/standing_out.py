@@ -15,6 +15,8 @@ _SUSPECT = 1.4  # spacing over that of the neighbours
 _HOVERING = 7.5  # distance from the quadric over the largest of the medians around each neighbour
 _FAR = 0.3  # and over the local spacing; of the neighbours' plane, too
 _PLANES = 16, 0.15, 2  # the nearest; off their planes, over their spacing, and of how many of these where sheets cross
+_SMOOTH = 0.01  # the medians above over the local spacing, where the surface below is smooth
+_TURNED = 0.85  # cosine between its normal and those of such planes then, at most: those along a bent surface turn less
 
 
 def proud(around: Surroundings) -> np.ndarray:
@@ -42,19 +44,22 @@ def hovering(around: Surroundings, progress: Progress) -> np.ndarray:
     around_near, row_near = np.unique(k_nearest(tree, surface[near], NEIGHBOURS + 1)[1], return_inverse=True)
     theirs = fit_quadrics(surface, around_near, _FITTED, progress.part(0.6, 0.8)).left_out()[row_near]
     theirs = np.median(theirs.reshape(*near.shape, -1), axis=2).max(axis=1)
-    height = quadrics_at(surface, points[row], _FITTED, progress.part(0.8, 1.0)).height
+    below = quadrics_at(surface, points[row], _FITTED, progress.part(0.8, 1.0))
     spacing = np.median(around.spacing[rest[near]], axis=1)
-    above = height > np.maximum(_HOVERING * theirs, _FAR * spacing)
-    suspect[row] = above & ~_where_sheets_cross(around, row, rest, tree)
+    above = below.height > np.maximum(_HOVERING * theirs, _FAR * spacing)
+    cross = _where_sheets_cross(around, row, rest, tree, below.normal, theirs < _SMOOTH * spacing)
+    suspect[row] = above & ~cross
     return suspect
 
 
-def _where_sheets_cross(around, row, rest, tree):
-    """Which of samples `row` (m,) lie in the planes of several of those near among `rest`, of which the tree is."""
+def _where_sheets_cross(around, row, rest, tree, normal, smooth):
+    """Which of samples `row` (m,) lie in the planes of several of those near among `rest`, of which the tree is; where
+    the surface below, of normals (m,3), is `smooth`, (m,) bool, in planes that are turned from it."""
     count, close, several = _PLANES
     near = rest[k_nearest(tree, around.points[row], count)[1]]
     height = np.einsum("mki,mki->mk", around.points[row, None] - around.centre[near], around.across[near])
-    return (np.abs(height) < close * around.spacing[near]).sum(axis=1) >= several
+    turned = ~smooth[:, None] | (np.abs(np.einsum("mi,mki->mk", normal, around.across[near])) < _TURNED)
+    return (turned & (np.abs(height) < close * around.spacing[near])).sum(axis=1) >= several
 
 
 def _standing_out(around, found, height, times):

@@ -3,6 +3,7 @@ import pytest
 
 from core.cleaning import detached, outliers, surroundings
 from core.cleaning.outliers import find_outliers
+from core.points import local_spacing
 from tests import shapes
 
 
@@ -264,6 +265,22 @@ def test_where_sheets_cross_few_samples_go_with_strays():
     marked = find_outliers(np.vstack([crossing, rng.uniform(-1.2, 1.2, (200, 3))]))
     assert marked[:6000].sum() <= 3
     assert marked[6000:].mean() > 0.95
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_strays_beside_a_bent_surface_are_found_in_planes_of_its_samples(seed):
+    """Planes of samples further along a bent surface run through what lies above it, as those of sheets that cross."""
+    chance, strays = np.random.default_rng(seed), np.random.default_rng(seed + 10)
+    around, across = chance.uniform(0, 2 * np.pi, (2, 20_000))
+    even = chance.random(20_000) < (1 + 0.4 * np.cos(across)) / 1.4
+    out, across = 1 + 0.4 * np.cos(across[even][:5000]), across[even][:5000]
+    around = around[even][:5000]
+    torus = np.stack([out * np.cos(around), out * np.sin(around), 0.4 * np.sin(across)], axis=1)
+    strays = strays.uniform([-1.5, -1.5, -0.5], [1.5, 1.5, 0.5], (250, 3))
+    marked = find_outliers(np.vstack([torus, strays]))
+    off = np.abs(np.hypot(np.hypot(strays[:, 0], strays[:, 1]) - 1, strays[:, 2]) - 0.4)
+    assert not marked[:5000].any()
+    assert (~marked[5000:][off > 0.4 * np.median(local_spacing(torus))]).sum() <= 1
 
 
 @pytest.mark.parametrize("around", [32, 64])
