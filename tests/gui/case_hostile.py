@@ -90,7 +90,7 @@ def case(gui):
             subprocess.run(["mount", *options, str(small)], check=True)
         result = yield from run()
         assert {obj["vad_role"] for obj in result.objects} == {"samples", "surface", "field"}
-        assert result["vad_warnings"].startswith("No volume: "), result["vad_warnings"]
+        assert "\nNo volume: " in result["vad_warnings"], result["vad_warnings"]
         assert "is out of date" in result["vad_warnings"], result["vad_warnings"]
         assert list(bpy.data.volumes) == [volume]
         assert volume.grids.load()
