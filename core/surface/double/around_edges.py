@@ -26,9 +26,7 @@ def order_around(sheet: Mesh) -> np.ndarray:
     angle = _angles(sheet, np.minimum(here, next_), np.maximum(here, next_), third)
     sorted_ = np.lexsort((angle, on))
     order[line], angle = order[line][sorted_], angle[sorted_]
-    turned = np.zeros(len(corner))
-    turned[order[line]] = angle
-    return as_around_vertices(sheet, order, turned)
+    return as_around_vertices(sheet, order, angle)
 
 
 def _angles(sheet, low, high, third):

@@ -29,11 +29,11 @@ def as_around_vertices(sheet: Mesh, order: np.ndarray, angle: np.ndarray) -> np.
     Around most vertices it does. For each other one, faces that follow each other around edges change places, those
     first that are turned by the least about them, until it has more regions and no other vertex has fewer.
 
-    angle : (3 f,) radians, by which the face of each such corner is turned about its edge
+    angle : (m,) radians, by which the faces of the corners at edges of more than two, in order, are turned about these
     """
     line = np.repeat(sheet.edges.count, sheet.edges.count) > 2
     corner = order[line]
-    links, angle = _links(sheet, order, line), angle[corner].tolist()
+    links, angle = _links(sheet, order, line), angle.tolist()
     for link in np.flatnonzero(links.lacking).tolist():
         while links.lacking[link] and (turns := _mended(links, link, angle)):
             links.take(turns)

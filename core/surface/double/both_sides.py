@@ -70,8 +70,8 @@ def _sides(sheet):
     edge, count = sheet.edges.number.reshape(-1), sheet.edges.count
     order, several = order_around(sheet), np.repeat(count, count)
     here, after = np.arange(corners), corner_after(np.arange(corners))
-    upwards = corner < corner[after]
     ends = sheet.edges.corners_at_ends(here)
+    upwards = ends[0] == here
     following, last = np.roll(order, -1), np.cumsum(count) - 1
     following[last] = order[last - count + 1]
     ahead, back = corners * ~upwards[order], corners * upwards[following]
