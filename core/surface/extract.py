@@ -132,7 +132,7 @@ def _signed_surface(choice, values, progress):
     """The boundary of the inside, from signed distances, and what is said of it."""
     local, grid, sides, said = choice.local, choice.grid, choice.single.sides, []
     meetings = choice.single.crossings.meetings
-    mesh = boundary_of_inside(values, meetings, local, grid, lambda: choice.extracted, progress)
+    mesh = boundary_of_inside(values, sides, meetings, local, grid, lambda: choice.extracted, progress)
     worst, missed = misfit(mesh, local, grid.spacing)
     if missed > _SOME:
         said.append(_said_of_missed(missed, "signed surface", "one of them is missing"))

@@ -38,19 +38,21 @@ def signed_distance(values, sides: Sides, surface: LocalSurface, place=np.asarra
     return sides.sign(values)
 
 
-def signed_mesh(values, passing: np.ndarray, surface: LocalSurface, grid: Grid, progress=None) -> Mesh:
+def signed_mesh(
+    values, wedges: np.ndarray, passing: np.ndarray, surface: LocalSurface, grid: Grid, progress=None
+) -> Mesh:
     """The zero set of signed distances, (nx,ny,nz) float32 or Blocks, pulled onto the surface where that is within a
     cell, and smoothed over the gaps that it spans: closed, two faces at each edge, wound outwards.
 
     Near parts that the signs of nodes do not show (see :mod:`.signs.thin_parts`) the mesh starts off the surface, as a
-    double cover does: around what is too thin, inside of slits. So flaps and inner walls have a face on either side,
-    and along lines where sheets pass through one another, close to which are the samples `passing` (n,) bool, each
-    wedge that lies inside has its own edge.
+    double cover does: around what is too thin, such as the ends of `wedges` (v,3), inside of slits. So flaps and inner
+    walls have a face on either side, and along lines where sheets pass through one another, close to which are the
+    samples `passing` (n,) bool, each wedge that lies inside has its own edge.
     """
     progress = Progress.of(progress)
     limit = np.float32(_CLAMP * grid.spacing)
     values = each(lambda u: np.clip(u, -limit, limit), values)
-    thin = find_thin_parts(values, passing, surface, grid, progress.part(0.0, 0.1))
+    thin = find_thin_parts(values, passing, surface, grid, progress.part(0.0, 0.1), wedges)
     vertices, faces = zero_set(values, thin, surface, grid, progress.part(0.1, 0.2))
     vertices = evened(vertices, faces)
     found = surface.project(vertices, progress.part(0.2, 0.7))

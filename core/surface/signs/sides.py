@@ -13,7 +13,7 @@ around an open sheet, no side need be asked: nothing is inside.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ from ...lookup import numbered
 from ...parts import near_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
+from .wedges import at_wedges
 
 _NEAREST, _FARTHEST = 1.0, 6.0  # cells; regions start at half the bridging length within these limits
 _BESIDE = 1.5  # cells, that distances differ by from node to node at most, with a margin
@@ -48,6 +49,8 @@ class Sides:
     alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
                 an open surface
     within    : (w,) bool, whether that side is the inside
+    wedges    : (v,3) float64, middles of others, outside, where two walls run so close that no node lies between them;
+                none are looked for where few edges have both ends on one side
     gaps      : (g,3) float64, middles of edges where the sides differ and no crossing is: openings
     crossings : int, number of crossed edges     grid : Grid of the nodes
     """
@@ -55,6 +58,7 @@ class Sides:
     inside: np.ndarray | Blocks
     alike: np.ndarray
     within: np.ndarray
+    wedges: np.ndarray
     gaps: np.ndarray
     crossings: int
     grid: Grid
@@ -117,7 +121,8 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     progress(0.7)
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster), crossings.meetings.beside, surface, grid)
     progress(0.9)
-    return _judged(inside, edges)
+    sides = _judged(inside, edges)
+    return sides if sides.complete or sides.share == 1 else _without_wedges(sides, edges, surface)
 
 
 def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
@@ -208,7 +213,7 @@ def _edges_along(axis, node, near, crossings, grid):
 
 def _judged(inside, edges):
     """The sides, with the edges that contradict them, from those along each axis."""
-    same, within, gaps = [], [], []
+    same, within, gaps, wedges = [], [], [], np.empty((0, 3))
     for along in edges:
         low = at_nodes(inside, along.low)
         differ = low != at_nodes(inside, along.high)
@@ -217,7 +222,18 @@ def _judged(inside, edges):
         within.append(low[alike])
         gaps.append(along.middles(~along.crossed & differ))
     crossed = sum(int(along.crossed.sum()) for along in edges)
-    return Sides(inside, *(np.concatenate(parts) for parts in (same, within, gaps)), crossed, edges[0].grid)
+    same, within, gaps = (np.concatenate(parts) for parts in (same, within, gaps))
+    return Sides(inside, same, within, wedges, gaps, crossed, edges[0].grid)
+
+
+def _without_wedges(sides, edges, surface):
+    """The sides with edges that cross two walls, see :func:`at_wedges`, apart from those that contradict them."""
+    ends = ((at_nodes(sides.inside, along.low), at_nodes(sides.inside, along.high)) for along in edges)
+    parting = [along.middles(along.crossed & (low != high)) for along, (low, high) in zip(edges, ends, strict=True)]
+    wedge = ~sides.within
+    wedge[wedge] = at_wedges(sides.alike[wedge], np.concatenate(parting), surface, sides.grid.spacing)
+    left = {"alike": sides.alike[~wedge], "within": sides.within[~wedge]}
+    return replace(sides, wedges=sides.alike[wedge], **left)
 
 
 def _numbered(node, alone, grid):

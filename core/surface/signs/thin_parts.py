@@ -28,8 +28,8 @@ _CHUNK = 1 << 12  # samples
 
 @dataclass(frozen=True)
 class ThinParts:
-    """Samples (t,3) with no node inside near them, `thin`, with none outside, `slits`, close to `lines` along which
-    sheets pass through one another, and `clear` ones, which are none of these."""
+    """Samples (t,3) with no node inside near them and ends of wedges, `thin`, samples with none outside, `slits`, those
+    close to `lines` along which sheets pass through one another, and `clear` ones, which are none of these."""
 
     thin: np.ndarray
     slits: np.ndarray
@@ -78,10 +78,16 @@ def _falling(away):
 
 
 def find_thin_parts(
-    values: np.ndarray | Blocks, passing: np.ndarray, surface: LocalSurface, grid: Grid, progress=None
+    values: np.ndarray | Blocks,
+    passing: np.ndarray,
+    surface: LocalSurface,
+    grid: Grid,
+    progress=None,
+    wedges: np.ndarray = np.empty((0, 3)),
 ) -> ThinParts | None:
     """Where samples have nodes within 1.25 cells on one side alone, by signed distances `values`, (nx,ny,nz) float32 or
-    Blocks, and those close to lines, `passing` (n,) bool; None where all have both and none is."""
+    Blocks, and those close to lines, `passing` (n,) bool; and places (v,3) that are known to be thin, `wedges`. None
+    where all samples have both, none is close to lines, and no place is given."""
 
     def one_sided(part):
         node, squared = _nodes_around(surface.points[part], grid, int(np.ceil(_REACH - 0.5)))
@@ -91,10 +97,11 @@ def find_thin_parts(
     chunks = Progress.of(progress).chunks(len(surface.points), _CHUNK)
     thin, slit = np.concatenate([found for _, found in in_order(one_sided, chunks)], axis=1)
     clear = ~(thin | slit | passing)
-    if clear.all():
+    if clear.all() and not len(wedges):
         return None
     kinds = thin & ~passing, slit & ~passing, passing, clear
-    return ThinParts(*(surface.points[chosen] for chosen in kinds), grid.spacing)
+    thin, *others = (surface.points[chosen] for chosen in kinds)
+    return ThinParts(np.concatenate([thin, wedges]), *others, grid.spacing)
 
 
 def _nodes_around(points, grid, half):

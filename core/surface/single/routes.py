@@ -79,7 +79,7 @@ def sheet_of_sides(
     values : (nx,ny,nz) float32 or Blocks, unsigned distances     cover : function that gives the double cover
     """
     if sides.complete:
-        return boundary_of_inside(sides.sign(values), crossings.meetings, surface, grid, cover, progress)
+        return boundary_of_inside(sides.sign(values), sides, crossings.meetings, surface, grid, cover, progress)
     if between is None or not crossings.normal.any():
         return between
     worst, missed = misfit(between, surface, grid.spacing)
@@ -87,7 +87,13 @@ def sheet_of_sides(
 
 
 def boundary_of_inside(
-    signed, meetings: Meetings, surface: LocalSurface, grid: Grid, cover: Callable[[], Mesh], progress=None
+    signed,
+    sides: Sides,
+    meetings: Meetings,
+    surface: LocalSurface,
+    grid: Grid,
+    cover: Callable[[], Mesh],
+    progress=None,
 ) -> Mesh:
     """The boundary of the inside of a closed surface, see :func:`signed_mesh`: closed and wound outwards.
 
@@ -97,7 +103,7 @@ def boundary_of_inside(
 
     signed : (nx,ny,nz) float32 or Blocks, distances, negative inside     cover : function that gives the double cover
     """
-    mesh = signed_mesh(signed, meetings.passing, surface, grid, progress)
+    mesh = signed_mesh(signed, sides.wedges, meetings.passing, surface, grid, progress)
     if not meetings.side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
         return mesh
     outer = untangled(mended(one_side(cover(), signed, surface, grid), surface, grid.spacing), surface)

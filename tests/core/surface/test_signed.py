@@ -166,7 +166,7 @@ def test_a_spanned_opening_is_smooth():
     values = (np.sign(radius - 1) * away).reshape(grid.shape).astype(np.float32)
     surface = fit_local_surface(points, points / np.linalg.norm(points, axis=1, keepdims=True), np.ones(len(points)),
                                 local_spacing(points), 3.0)  # fmt: skip
-    mesh = signed_mesh(values, np.zeros(len(points), bool), surface, grid)
+    mesh = signed_mesh(values, np.empty((0, 3)), np.zeros(len(points), bool), surface, grid)
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     cap = (a[:, 2] > 0.75) & (np.hypot(a[:, 0], a[:, 1]) < 0.4)

@@ -210,6 +210,6 @@ def test_signs():
     values = np.ones((2, 2, 2), np.float32)
     inside, nowhere = np.zeros((2, 2, 2), bool), np.empty((0, 3))
     inside[0] = True
-    signed = Sides(inside, nowhere, np.empty(0, bool), nowhere, 0, GRID).sign(values)
+    signed = Sides(inside, nowhere, np.empty(0, bool), nowhere, nowhere, 0, GRID).sign(values)
     assert signed.dtype == np.float32
     np.testing.assert_array_equal(signed, np.where(inside, -1, 1))

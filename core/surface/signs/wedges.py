@@ -1,0 +1,31 @@
+"""Two walls of a closed shape so close that no node lies between them, as near the ends of wedges and in thin walls.
+
+Edges of the grid are seen to cross one wall there, with the outside at both ends, as around a flap. Samples tell them
+apart: those of a flap are on one sheet.
+"""
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ...field.grid import ADJACENT
+from ...field.local_surface import LocalSurface
+from ...parts import near_parts
+
+_CREASE = 2.0  # local spacings off a crease, where a wedge ends
+_NARROW = 2.0  # cells from where a node lies between its walls
+_MOST = 0.6  # of all such crossings, at least, that samples show two walls at; fewer are chance
+_SOME = 0.2  # of those of a connected patch, at least; a flap shows some where it joins the rest
+
+
+def at_wedges(places: np.ndarray, parting: np.ndarray, surface: LocalSurface, cell: float) -> np.ndarray:
+    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if most are,
+    connected ones of which some are. Samples show it that are on sheets side by side (see :func:`sheet_room`), or
+    beside a crease, close to crossings at `parting` (p,3) that part inside and outside."""
+    if not len(places):
+        return np.zeros(0, bool)
+    sample, patch = surface.tree.query(places, workers=-1)[1], near_parts(places, ADJACENT * cell)
+    crease = surface.rims.limit[sample].min(axis=1) <= _CREASE * surface.spacing[sample]
+    narrow = KDTree(parting).query(places, workers=-1)[0] <= _NARROW * cell
+    shown = np.isfinite(surface.room[sample]) | (crease & narrow)
+    some = np.bincount(patch, shown) >= _SOME * np.bincount(patch)
+    return some[patch] & (shown.mean() >= _MOST)
