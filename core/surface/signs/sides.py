@@ -49,8 +49,7 @@ class Sides:
     alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
                 an open surface
     within    : (w,) bool, whether that side is the inside
-    wedges    : (v,3) float64, middles of others, outside, where two walls run so close that no node lies between them;
-                none are looked for where few edges have both ends on one side
+    wedges    : (v,3) float64, middles of others, outside, where two walls run so close that no node lies between them
     gaps      : (g,3) float64, middles of edges where the sides differ and no crossing is: openings
     crossings : int, number of crossed edges     grid : Grid of the nodes
     """
@@ -122,7 +121,7 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster), crossings.meetings.beside, surface, grid)
     progress(0.9)
     sides = _judged(inside, edges)
-    return sides if sides.complete or sides.share == 1 else _without_wedges(sides, edges, surface)
+    return sides if sides.share == 1 else _without_wedges(sides, edges, crossings.meetings.passing, surface)
 
 
 def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
@@ -226,12 +225,13 @@ def _judged(inside, edges):
     return Sides(inside, same, within, wedges, gaps, crossed, edges[0].grid)
 
 
-def _without_wedges(sides, edges, surface):
+def _without_wedges(sides, edges, passing, surface):
     """The sides with edges that cross two walls, see :func:`at_wedges`, apart from those that contradict them."""
     ends = ((at_nodes(sides.inside, along.low), at_nodes(sides.inside, along.high)) for along in edges)
     parting = [along.middles(along.crossed & (low != high)) for along, (low, high) in zip(edges, ends, strict=True)]
     wedge = ~sides.within
-    wedge[wedge] = at_wedges(sides.alike[wedge], np.concatenate(parting), surface, sides.grid.spacing)
+    parting, cell = np.concatenate(parting), sides.grid.spacing
+    wedge[wedge] = at_wedges(sides.alike[wedge], parting, passing, surface, cell)
     left = {"alike": sides.alike[~wedge], "within": sides.within[~wedge]}
     return replace(sides, wedges=sides.alike[wedge], **left)
 

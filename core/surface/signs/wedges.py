@@ -17,15 +17,19 @@ _MOST = 0.6  # of all such crossings, at least, that samples show two walls at; 
 _SOME = 0.2  # of those of a connected patch, at least; a flap shows some where it joins the rest
 
 
-def at_wedges(places: np.ndarray, parting: np.ndarray, surface: LocalSurface, cell: float) -> np.ndarray:
+def at_wedges(
+    places: np.ndarray, parting: np.ndarray, passing: np.ndarray, surface: LocalSurface, cell: float
+) -> np.ndarray:
     """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if most are,
     connected ones of which some are. Samples show it that are on sheets side by side (see :func:`sheet_room`), or
-    beside a crease, close to crossings at `parting` (p,3) that part inside and outside."""
+    beside a crease, close to crossings at `parting` (p,3) that part inside and outside; but not those close to lines
+    along which sheets pass through one another, `passing` (n,) bool, where wedges end that are known."""
     if not len(places):
         return np.zeros(0, bool)
     sample, patch = surface.tree.query(places, workers=-1)[1], near_parts(places, ADJACENT * cell)
     crease = surface.rims.limit[sample].min(axis=1) <= _CREASE * surface.spacing[sample]
     narrow = KDTree(parting).query(places, workers=-1)[0] <= _NARROW * cell
-    shown = np.isfinite(surface.room[sample]) | (crease & narrow)
+    known = passing[sample]
+    shown = (np.isfinite(surface.room[sample]) | (crease & narrow)) & ~known
     some = np.bincount(patch, shown) >= _SOME * np.bincount(patch)
-    return some[patch] & (shown.mean() >= _MOST)
+    return some[patch] & ~known & (shown.mean() >= _MOST)

@@ -62,7 +62,7 @@ def test_a_wide_flap_at_a_shape_with_thin_edges_is_told():
         reconstruct(points, Settings(resolution=64, surface="signed"))
 
 
-PARTING = np.array([[0.0, 0, 0]])
+PARTING, NOWHERE = np.array([[0.0, 0, 0]]), np.zeros(30, bool)
 
 
 def surface(points, beside, crease):
@@ -85,7 +85,7 @@ def surface(points, beside, crease):
 )
 def test_samples_tell_two_walls_from_one(beside, crease, away, expected):
     places = np.array([[away, 0, 0], [away + 0.5, 0, 0]])
-    found = at_wedges(places, PARTING, surface(places, np.full(2, beside), np.full(2, crease)), 1.0)
+    found = at_wedges(places, PARTING, NOWHERE, surface(places, np.full(2, beside), np.full(2, crease)), 1.0)
     np.testing.assert_array_equal(found, [expected] * 2)
 
 
@@ -94,9 +94,16 @@ def test_they_do_so_patch_by_patch_and_where_most_do():
     places = np.stack([x, np.where(x < 20, 0, 9), 0 * x], axis=1)
     for first, second, expected in ((20, 2, x < 30), (20, 1, x < 20), (13, 4, x < 0)):
         beside = np.concatenate([np.arange(20) < first, np.arange(10) < second])
-        found = at_wedges(places, PARTING, surface(places, beside, np.full(30, np.inf)), 1.0)
+        found = at_wedges(places, PARTING, NOWHERE, surface(places, beside, np.full(30, np.inf)), 1.0)
         np.testing.assert_array_equal(found, expected)
 
 
+def test_close_to_lines_where_sheets_pass_through_each_other_there_are_none():
+    places = np.arange(30.0)[:, None] * [1, 0, 0]
+    passing = places[:, 0] < 10
+    found = at_wedges(places, PARTING, passing, surface(places, np.ones(30, bool), np.full(30, np.inf)), 1.0)
+    np.testing.assert_array_equal(found, ~passing)
+
+
 def test_of_no_places_there_are_none():
-    assert at_wedges(np.empty((0, 3)), PARTING, surface(PARTING, [False], [np.inf]), 1.0).shape == (0,)
+    assert at_wedges(np.empty((0, 3)), PARTING, NOWHERE, surface(PARTING, [False], [np.inf]), 1.0).shape == (0,)
