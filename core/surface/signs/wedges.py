@@ -9,10 +9,13 @@ from scipy.spatial import KDTree
 
 from ...field.grid import ADJACENT
 from ...field.local_surface import LocalSurface
+from ...neighbourhoods.quadrics import fit_quadrics
 from ...parts import near_parts
 
 _CREASE = 2.0  # local spacings off a crease, where a wedge ends
 _NARROW = 2.0  # cells from where a node lies between its walls
+_NEIGHBOURS, _OFF = 24, 0.025  # of samples, and local spacings that those of one sheet are off quadrics through these
+_LARGE = 0.01  # of all crossings, a connected patch whose samples show that; fewer are off by chance
 _MOST = 0.6  # of all such crossings, at least, that samples show two walls at; fewer are chance
 _SOME = 0.2  # of those of a connected patch, at least; a flap shows some where it joins the rest
 
@@ -22,14 +25,28 @@ def at_wedges(
 ) -> np.ndarray:
     """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if most are,
     connected ones of which some are. Samples show it that are on sheets side by side (see :func:`sheet_room`), or
-    beside a crease, close to crossings at `parting` (p,3) that part inside and outside; but not those close to lines
-    along which sheets pass through one another, `passing` (n,) bool, where wedges end that are known."""
+    beside a crease, close to crossings at `parting` (p,3) that part inside and outside, or in a large patch and off the
+    one sheet that would be there, as under noise; but not those close to lines along which sheets pass through one
+    another, `passing` (n,) bool, where wedges end that are known."""
     if not len(places):
         return np.zeros(0, bool)
     sample, patch = surface.tree.query(places, workers=-1)[1], near_parts(places, ADJACENT * cell)
     crease = surface.rims.limit[sample].min(axis=1) <= _CREASE * surface.spacing[sample]
     narrow = KDTree(parting).query(places, workers=-1)[0] <= _NARROW * cell
-    known = passing[sample]
-    shown = (np.isfinite(surface.room[sample]) | (crease & narrow)) & ~known
+    shown = np.isfinite(surface.room[sample]) | (crease & narrow)
+    shown |= _is_scattered(patch, sample, _LARGE * (len(places) + len(parting)), surface)[patch]
+    shown &= ~passing[sample]
     some = np.bincount(patch, shown) >= _SOME * np.bincount(patch)
-    return some[patch] & ~known & (shown.mean() >= _MOST)
+    return some[patch] & ~passing[sample] & (shown.mean() >= _MOST)
+
+
+def _is_scattered(patch, sample, least, surface):
+    """Which patches have so many crossings at least, and their samples off the sheet through the neighbours of each;
+    from the patch and the sample (w,) of each crossing."""
+    size, neighbours = np.bincount(patch), min(_NEIGHBOURS, len(surface.points))
+    scattered = np.zeros(len(size), bool)
+    for each in np.flatnonzero(size >= least):
+        own = np.unique(sample[patch == each])
+        off = fit_quadrics(surface.points, own, neighbours).height / surface.spacing[own]
+        scattered[each] = np.median(off) > _OFF
+    return scattered

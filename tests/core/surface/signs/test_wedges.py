@@ -47,6 +47,16 @@ def test_the_thin_edges_of_a_low_pyramid_are_no_flaps(height):
     assert run.report["warnings"] == signed.report["warnings"] == []
 
 
+@pytest.mark.parametrize("noise", [0.03, 0.06])
+def test_nor_are_they_under_noise(noise):
+    """Of that many spacings, in which sheets side by side do not show."""
+    points = low_pyramid(5000, 0.3) @ TURN
+    points += np.random.default_rng(1).normal(scale=noise * np.sqrt(8.2 / 5000), size=points.shape)
+    for kind in ("single", "signed"):
+        run = reconstruct(points, Settings(resolution=96, surface=kind))
+        assert shapes.euler(run.sheet or run.surface) == 2
+
+
 def test_nor_are_acute_edges_that_are_curved():
     run = reconstruct(hollowed_cube(6000) @ TURN, Settings(surface="signed"))
     assert shapes.euler(run.surface) == -8
@@ -67,10 +77,9 @@ PARTING, NOWHERE = np.array([[0.0, 0, 0]]), np.zeros(30, bool)
 
 def surface(points, beside, crease):
     """Samples a local spacing of 1, of which some are on sheets side by side, or that far from a crease."""
-    room, limit = np.where(beside, 0.2, np.inf), np.stack([crease, np.full(len(points), np.inf)], axis=1)
-    return SimpleNamespace(
-        tree=KDTree(points), room=room, spacing=np.ones(len(points)), rims=SimpleNamespace(limit=limit)
-    )
+    rims = SimpleNamespace(limit=np.stack([crease, np.full(len(points), np.inf)], axis=1))
+    room, spacing = np.where(beside, 0.2, np.inf), np.ones(len(points))
+    return SimpleNamespace(points=points, tree=KDTree(points), room=room, spacing=spacing, rims=rims)
 
 
 @pytest.mark.parametrize(
@@ -103,6 +112,16 @@ def test_close_to_lines_where_sheets_pass_through_each_other_there_are_none():
     passing = places[:, 0] < 10
     found = at_wedges(places, PARTING, passing, surface(places, np.ones(30, bool), np.full(30, np.inf)), 1.0)
     np.testing.assert_array_equal(found, ~passing)
+
+
+@pytest.mark.parametrize(("height", "count", "expected"), [(0.2, 30, True), (0.2, 29, False), (0.02, 30, False)])
+def test_samples_off_one_sheet_tell_it_in_large_patches(height, count, expected):
+    """Of a square lattice, above and below a plane by turns; a patch of one in 100 of all crossings, or smaller."""
+    x, y = np.indices((9, 9)).reshape(2, -1)
+    points = np.stack([x, y, height * (-1.0) ** (x + y)], axis=1)
+    places, parting = points[:count], np.tile([[0, 0, 99.0]], (3000 - 30, 1))
+    given = surface(points, np.zeros(81, bool), np.full(81, np.inf))
+    assert at_wedges(places, parting, np.zeros(81, bool), given, 1.0).tolist() == [expected] * count
 
 
 def test_of_no_places_there_are_none():
