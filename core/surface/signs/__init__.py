@@ -3,7 +3,7 @@
 sides      : the inside of a closed shape
 two_sides  : the two sides of a surface that bounds no inside
 spreading  : signs handed on from neighbour to neighbour, of samples and of faces
-wedges     : thin ones told from flaps
+wedges     : their thin ends, told from flaps
 thin_parts : what the signs of nodes do not show
 zero_set   : where the distances are zero, as a mesh
 """

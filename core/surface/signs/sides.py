@@ -49,7 +49,7 @@ class Sides:
     alike     : (w,3) float64, middles of crossed edges with both ends on one side: of flaps, of inner walls, of all of
                 an open surface
     within    : (w,) bool, whether that side is the inside
-    wedges    : (v,3) float64, middles of others, outside, where two walls run so close that no node lies between them
+    wedges    : (v,3) float64, middles of others, where two walls run so close that no node lies between them
     gaps      : (g,3) float64, middles of edges where the sides differ and no crossing is: openings
     crossings : int, number of crossed edges     grid : Grid of the nodes
     """
@@ -64,7 +64,7 @@ class Sides:
 
     @property
     def share(self) -> float:
-        """Share of the crossings that have one side at both ends."""
+        """Share of the crossings that have one side at both ends, those of wedges aside."""
         return len(self.alike) / max(self.crossings, 1)
 
     @property
@@ -212,7 +212,7 @@ def _edges_along(axis, node, near, crossings, grid):
 
 def _judged(inside, edges):
     """The sides, with the edges that contradict them, from those along each axis."""
-    same, within, gaps, wedges = [], [], [], np.empty((0, 3))
+    same, within, gaps = [], [], []
     for along in edges:
         low = at_nodes(inside, along.low)
         differ = low != at_nodes(inside, along.high)
@@ -222,18 +222,17 @@ def _judged(inside, edges):
         gaps.append(along.middles(~along.crossed & differ))
     crossed = sum(int(along.crossed.sum()) for along in edges)
     same, within, gaps = (np.concatenate(parts) for parts in (same, within, gaps))
-    return Sides(inside, same, within, wedges, gaps, crossed, edges[0].grid)
+    return Sides(inside, same, within, np.empty((0, 3)), gaps, crossed, edges[0].grid)
 
 
 def _without_wedges(sides, edges, passing, surface):
     """The sides with edges that cross two walls, see :func:`at_wedges`, apart from those that contradict them."""
-    ends = ((at_nodes(sides.inside, along.low), at_nodes(sides.inside, along.high)) for along in edges)
-    parting = [along.middles(along.crossed & (low != high)) for along, (low, high) in zip(edges, ends, strict=True)]
-    wedge = ~sides.within
-    parting, cell = np.concatenate(parting), sides.grid.spacing
-    wedge[wedge] = at_wedges(sides.alike[wedge], parting, passing, surface, cell)
-    left = {"alike": sides.alike[~wedge], "within": sides.within[~wedge]}
-    return replace(sides, wedges=sides.alike[wedge], **left)
+    differ = (at_nodes(sides.inside, along.low) != at_nodes(sides.inside, along.high) for along in edges)
+    parting = [along.middles(along.crossed & parted) for along, parted in zip(edges, differ, strict=True)]
+    outside, wedge = np.flatnonzero(~sides.within), np.zeros(len(sides.alike), bool)
+    places = sides.alike[outside]
+    wedge[outside] = at_wedges(places, np.concatenate(parting), passing, surface, sides.grid.spacing)
+    return replace(sides, alike=sides.alike[~wedge], within=sides.within[~wedge], wedges=sides.alike[wedge])
 
 
 def _numbered(node, alone, grid):

@@ -1,4 +1,4 @@
-"""Two walls of a closed shape so close that no node lies between them, as near the ends of wedges and in thin walls.
+"""Two walls of a closed shape so close that no node lies between them, as at the ends of wedges and in thin walls.
 
 Edges of the grid are seen to cross one wall there, with the outside at both ends, as around a flap. Samples tell them
 apart: those of a flap are on one sheet.
@@ -15,26 +15,27 @@ from ...parts import near_parts
 _CREASE = 2.0  # local spacings off a crease, where a wedge ends
 _NARROW = 2.0  # cells from where a node lies between its walls
 _NEIGHBOURS, _OFF = 24, 0.025  # of samples, and local spacings that those of one sheet are off quadrics through these
-_LARGE = 0.01  # of all crossings, a connected patch whose samples show that; fewer are off by chance
-_MOST = 0.6  # of all such crossings, at least, that samples show two walls at; fewer are chance
+_MANY = 0.01  # of all crossings, at least; square edges have fewer, and samples of a smaller patch are off by chance
+_MOST = 0.6  # of those with the outside at both ends, at least, that samples show two walls at; fewer are chance
 _SOME = 0.2  # of those of a connected patch, at least; a flap shows some where it joins the rest
 
 
 def at_wedges(
     places: np.ndarray, parting: np.ndarray, passing: np.ndarray, surface: LocalSurface, cell: float
 ) -> np.ndarray:
-    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if most are,
-    connected ones of which some are. Samples show it that are on sheets side by side (see :func:`sheet_room`), or
-    beside a crease, close to crossings at `parting` (p,3) that part inside and outside, or in a large patch and off the
-    one sheet that would be there, as under noise; but not those close to lines along which sheets pass through one
-    another, `passing` (n,) bool, where wedges end that are known."""
-    if not len(places):
-        return np.zeros(0, bool)
+    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if these are
+    many and samples show it at most, connected ones of which some are shown. Samples are on sheets side by side there
+    (see :func:`sheet_room`), or beside a crease, close to crossings at `parting` (p,3) that part inside and outside,
+    or, as under noise, off the one sheet that a large patch would be; but not close to lines along which sheets pass
+    through one another, `passing` (n,) bool, where wedges end that are known."""
+    many = _MANY * (len(places) + len(parting))
+    if len(places) <= many:
+        return np.zeros(len(places), bool)
     sample, patch = surface.tree.query(places, workers=-1)[1], near_parts(places, ADJACENT * cell)
     crease = surface.rims.limit[sample].min(axis=1) <= _CREASE * surface.spacing[sample]
     narrow = KDTree(parting).query(places, workers=-1)[0] <= _NARROW * cell
     shown = np.isfinite(surface.room[sample]) | (crease & narrow)
-    shown |= _is_scattered(patch, sample, _LARGE * (len(places) + len(parting)), surface)[patch]
+    shown |= _is_scattered(patch, sample, many, surface)[patch]
     shown &= ~passing[sample]
     some = np.bincount(patch, shown) >= _SOME * np.bincount(patch)
     return some[patch] & ~passing[sample] & (shown.mean() >= _MOST)
