@@ -23,11 +23,11 @@ _SOME = 0.2  # of those of a connected patch, at least; a flap shows some where 
 def at_wedges(
     places: np.ndarray, parting: np.ndarray, passing: np.ndarray, surface: LocalSurface, cell: float
 ) -> np.ndarray:
-    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if these are
-    many and samples show it at most, connected ones of which some are shown. Samples are on sheets side by side there
-    (see :func:`sheet_room`), or beside a crease, close to crossings at `parting` (p,3) that part inside and outside,
-    or, as under noise, off the one sheet that a large patch would be; but not close to lines along which sheets pass
-    through one another, `passing` (n,) bool, where wedges end that are known."""
+    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if there are
+    many, and samples show two at most of these, connected ones of which some are shown. Samples are on sheets side by
+    side there (see :func:`sheet_room`), or beside a crease, close to crossings at `parting` (p,3) that part inside and
+    outside, or, as under noise, off the one sheet that a large patch would be; but not close to lines along which
+    sheets pass through one another, `passing` (n,) bool, where wedges end that are known."""
     many = _MANY * (len(places) + len(parting))
     if len(places) <= many:
         return np.zeros(len(places), bool)
