@@ -13,7 +13,7 @@ around an open sheet, no side need be asked: nothing is inside.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -107,7 +107,7 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     if _is_open(labels, surface, grid):
         low, axis = np.divmod(crossings.changing_sides, 3)
         edges = [_Edges(low[axis == a], a, np.ones((axis == a).sum(), bool), grid) for a in range(3)]
-        return _judged(each(np.zeros_like, near), edges)
+        return _judged(each(np.zeros_like, near), edges, crossings.meetings.passing, surface)
     node = marked_nodes(near)
     number, n = _numbered(node, at_nodes(values, node) <= _ALONE * grid.spacing, grid)
     cluster = each(lambda label: label.astype(np.int32) - 1, labels)
@@ -120,8 +120,7 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     progress(0.7)
     inside = _without_specks(each(lambda c: side[c] & (c >= 0), cluster), crossings.meetings.beside, surface, grid)
     progress(0.9)
-    sides = _judged(inside, edges)
-    return sides if sides.share == 1 else _without_wedges(sides, edges, crossings.meetings.passing, surface)
+    return _judged(inside, edges, crossings.meetings.passing, surface)
 
 
 def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
@@ -210,29 +209,21 @@ def _edges_along(axis, node, near, crossings, grid):
     return _Edges(low, axis, at_nodes(crossed, low), grid)
 
 
-def _judged(inside, edges):
-    """The sides, with the edges that contradict them, from those along each axis."""
-    same, within, gaps = [], [], []
+def _judged(inside, edges, passing, surface):
+    """The sides, with the edges that contradict them, from those along each axis; see :func:`at_wedges`."""
+    same, within, parting, gaps = [], [], [], []
     for along in edges:
         low = at_nodes(inside, along.low)
         differ = low != at_nodes(inside, along.high)
         alike = along.crossed & ~differ
         same.append(along.middles(alike))
         within.append(low[alike])
+        parting.append(along.middles(along.crossed & differ))
         gaps.append(along.middles(~along.crossed & differ))
-    crossed = sum(int(along.crossed.sum()) for along in edges)
-    same, within, gaps = (np.concatenate(parts) for parts in (same, within, gaps))
-    return Sides(inside, same, within, np.empty((0, 3)), gaps, crossed, edges[0].grid)
-
-
-def _without_wedges(sides, edges, passing, surface):
-    """The sides with edges that cross two walls, see :func:`at_wedges`, apart from those that contradict them."""
-    differ = (at_nodes(sides.inside, along.low) != at_nodes(sides.inside, along.high) for along in edges)
-    parting = [along.middles(along.crossed & parted) for along, parted in zip(edges, differ, strict=True)]
-    outside, wedge = np.flatnonzero(~sides.within), np.zeros(len(sides.alike), bool)
-    places = sides.alike[outside]
-    wedge[outside] = at_wedges(places, np.concatenate(parting), passing, surface, sides.grid.spacing)
-    return replace(sides, alike=sides.alike[~wedge], within=sides.within[~wedge], wedges=sides.alike[wedge])
+    same, within, parting, gaps = (np.concatenate(parts) for parts in (same, within, parting, gaps))
+    grid, crossed, wedge = edges[0].grid, len(same) + len(parting), ~within
+    wedge[wedge] = at_wedges(same[wedge], parting, passing, surface, grid.spacing)
+    return Sides(inside, same[~wedge], within[~wedge], same[wedge], gaps, crossed, grid)
 
 
 def _numbered(node, alone, grid):

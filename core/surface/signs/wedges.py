@@ -23,13 +23,14 @@ _SOME = 0.2  # of those of a connected patch, at least; a flap shows some where 
 def at_wedges(
     places: np.ndarray, parting: np.ndarray, passing: np.ndarray, surface: LocalSurface, cell: float
 ) -> np.ndarray:
-    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: if there are
-    many, and samples show two at most of these, connected ones of which some are shown. Samples are on sheets side by
-    side there (see :func:`sheet_room`), or beside a crease, close to crossings at `parting` (p,3) that part inside and
-    outside, or, as under noise, off the one sheet that a large patch would be; but not close to lines along which
-    sheets pass through one another, `passing` (n,) bool, where wedges end that are known."""
+    """Which crossings with the outside at both ends, at places (w,3), are those of two walls, (w,) bool: where such
+    crossings are many, and most of them are shown to be, all patches that some are shown in. It is shown by samples on
+    sheets side by side (see :func:`sheet_room`), by those beside a crease, close to crossings at `parting` (p,3) that
+    part inside and outside, and, as under noise, by those off the one sheet that a large patch would be; but not close
+    to lines along which sheets pass through one another, `passing` (n,) bool, where wedges end that are known. None are
+    where nothing parts the two, as around an open sheet."""
     many = _MANY * (len(places) + len(parting))
-    if len(places) <= many:
+    if len(places) <= many or not len(parting):
         return np.zeros(len(places), bool)
     sample, patch = surface.tree.query(places, workers=-1)[1], near_parts(places, ADJACENT * cell)
     crease = surface.rims.limit[sample].min(axis=1) <= _CREASE * surface.spacing[sample]
@@ -44,10 +45,12 @@ def at_wedges(
 def _is_scattered(patch, sample, least, surface):
     """Which patches have so many crossings at least, and their samples off the sheet through the neighbours of each;
     from the patch and the sample (w,) of each crossing."""
-    size, neighbours = np.bincount(patch), min(_NEIGHBOURS, len(surface.points))
-    scattered = np.zeros(len(size), bool)
-    for each in np.flatnonzero(size >= least):
-        own = np.unique(sample[patch == each])
-        off = fit_quadrics(surface.points, own, neighbours).height / surface.spacing[own]
-        scattered[each] = np.median(off) > _OFF
+    points, size = surface.points, np.bincount(patch)
+    large, scattered = np.flatnonzero(size >= least), np.zeros(len(size), bool)
+    if not len(large):
+        return scattered
+    chosen = np.isin(patch, large)
+    among, own = np.unique([patch[chosen], sample[chosen]], axis=1)
+    off = fit_quadrics(points, own, min(_NEIGHBOURS, len(points))).height / surface.spacing[own]
+    scattered[large] = [np.median(off[among == each]) > _OFF for each in large]
     return scattered
