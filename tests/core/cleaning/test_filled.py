@@ -56,6 +56,18 @@ def test_boundaries_of_filled_solids_are_taken(name):
     assert "points lie inside a volume that they fill: its boundary alone is taken" in " ".join(run.report["warnings"])
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.2])
+def test_many_sheets_side_by_side_are_no_solid(noise):
+    rng, gap = np.random.default_rng(0), 2.5 * np.sqrt(12 / 6000)
+    points = with_noise(np.column_stack([rng.random((6000, 2)), gap * rng.integers(0, 12, 6000)]), noise)
+    assert not fills_volume(points, 64, seed=0)[0]
+    found, done = clean(prepare_samples(points))
+    assert done["noisy"] > 5900
+    assert len(found.points) > 5900
+    turn = np.exp(2j * np.pi * found.points[:, 2] * found.scale / gap)
+    assert abs(turn.mean()) > 0.9
+
+
 def test_boundary_of_ball_is_its_outermost_samples():
     points = SOLIDS["ball"]
     bounds = bounds_volume(points, local_spacing(points), seed=0)
