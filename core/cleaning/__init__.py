@@ -7,5 +7,6 @@ thin_walls, flat_patches                     : clean samples that look noisy
 eyes, averaged                               : noisy ones that look like those
 voxels, depth_steps                          : samples in steps, which are off the surface by up to half of one
 noise_level, positions                       : how noisy samples are, and where they lie without the noise
+meeting_sheets                               : where they lie near edges and junctions
 filled                                       : those that fill a volume, and which of them bound it
 """

@@ -13,6 +13,7 @@ from ..neighbourhoods.clusters import Clusters
 from ..neighbourhoods.quadrics import fit_quadrics
 from ..progress import Progress
 from ..settings import Settings
+from .meeting_sheets import onto_one_sheet
 from .noise import noisy_samples
 from .noise_level import LADDER, estimate_noise
 from .voxels import find_voxels
@@ -21,6 +22,7 @@ LONGEST_MOVE = 4.0  # standard deviations of the noise
 
 _SHARES = 0.7, 0.6, 0.25  # of the best single neighbourhood, pass by pass, which together average over more than one;
 # the last takes out what is left between samples side by side
+_LEFT = 1.0, 0.5, 0.35  # of the noise, before each pass
 _STEPS_PER_OCTAVE = 2  # of the neighbourhood sizes used
 
 
@@ -51,7 +53,8 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     sizes = [_rounded(share * noise.neighbours, len(points)) for share in _SHARES]
     moved = points
     for turn, neighbours in enumerate(sizes):
-        moved = _onto_quadrics(moved, noisy, neighbours, progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
+        left = _LEFT[turn] * noise.level
+        moved = _onto_sheets(moved, noisy, neighbours, left, progress.part(0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
     step = shortened(strength * (moved - points), LONGEST_MOVE * noise.level)
     counts = {
         "noisy": int(noisy.sum()),
@@ -68,9 +71,15 @@ def _rounded(neighbours, n):
     return np.clip(np.rint(2 ** (steps / _STEPS_PER_OCTAVE)).astype(int), LADDER[0], n - 1)
 
 
-def _onto_quadrics(points, noisy, neighbours, progress):
+def _onto_sheets(points, noisy, neighbours, level, progress):
+    """Points moved onto quadrics through their neighbours, near edges onto those of one face, see
+    :mod:`.meeting_sheets`."""
+    step, normal, spread = np.zeros_like(points), np.zeros_like(points), np.zeros(len(points))
     moved, clusters = points.copy(), Clusters(points)
-    for k, part in progress.turns(np.unique(neighbours[noisy])):
-        rows = np.flatnonzero(noisy & (neighbours == k))
-        moved[rows] += fit_quadrics(points, rows, int(k), part, clusters).step
+    sizes = [(int(k), np.flatnonzero(noisy & (neighbours == k))) for k in np.unique(neighbours[noisy])]
+    for (k, rows), part in progress.part(0.0, 0.6).turns(sizes):
+        fit = fit_quadrics(points, rows, k, part, clusters)
+        step[rows], normal[rows], spread[rows] = fit.step, fit.normal, fit.spread
+    for (k, rows), part in progress.part(0.6, 1.0).turns(sizes):
+        moved[rows] += onto_one_sheet(points, rows, k, (step, normal, spread), level, part)
     return moved

@@ -47,6 +47,7 @@ class Quadrics:
     normal   : (m,3) float64, unit normal of the quadric over the sample
     leverage : (m,) float64 in [0,1), share of its own position in the quadric's height at the sample
     radius   : (m,) float64, distance to the farthest of the neighbours
+    spread   : (m,) float64, robust standard deviation of the neighbours off it, before any of them loses weight
     """
 
     step: np.ndarray
@@ -54,6 +55,7 @@ class Quadrics:
     normal: np.ndarray
     leverage: np.ndarray
     radius: np.ndarray
+    spread: np.ndarray
 
     def left_out(self) -> np.ndarray:
         """(m,) float64: distance to the quadric that the sample itself had no part in."""
@@ -133,45 +135,62 @@ def _through(points, places, sizes, way, progress):
 
 def _quadrics(offset, distance, radius):
     """Quadrics through neighbours with offsets, three (m,k), from the sample and distances (m,k), in radii (m,)."""
-    normal, frame, basis, weight, height = _in_frames(offset, distance)
-    residual = _off_fit(basis, weight, height)
-    scale = np.float32(_CAUCHY * GAUSS) * np.median(np.abs(residual), axis=1, keepdims=True)
-    weight = weight / (1 + (residual / np.maximum(scale, _EXACT)) ** 2)
-    coefficients, matrix, full = _weighted_fit(basis, weight, height)
-
-    upright = normal - np.einsum("ma,mai->mi", coefficients[:, 1:3], frame)
-    squared = row_dots(upright, upright)
-    step = (radius * coefficients[:, 0] / squared)[:, None] * upright
+    normal, frame, basis, weight, height = in_frames(offset, distance)
+    residual = off_fit(weighted_fit(basis, weight, height)[0], basis, height)
+    spread = np.float32(GAUSS) * np.median(np.abs(residual), axis=1)
+    weight = weight / (1 + (residual / np.maximum(np.float32(_CAUCHY) * spread[:, None], _EXACT)) ** 2)
+    coefficients, matrix, full = weighted_fit(basis, weight, height)
+    step, height, normal = onto_quadrics(coefficients, normal, frame, radius)
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(_COEFFICIENTS)[0], coefficients.shape))[:, 0]
-    steep = np.sqrt(squared)
-    height, normal = radius * np.abs(coefficients[:, 0]) / steep, upright / steep[:, None]
-    return Quadrics(step, height, normal, np.minimum(leverage, 0.95), radius)
+    return Quadrics(step, height, normal, np.minimum(leverage, 0.95), radius, radius * spread)
 
 
 def _residuals(offset, distance, radius):
     """Residuals of such neighbours."""
-    normal, _, basis, weight, height = _in_frames(offset, distance)
-    squared = _off_fit(basis, weight, height) ** 2
+    normal, _, basis, weight, height = in_frames(offset, distance)
+    squared = off_fit(weighted_fit(basis, weight, height)[0], basis, height) ** 2
     weight /= np.einsum("mk->m", weight)[:, None]
     second, fourth = (row_dots(weight, term).astype(float) for term in (squared, squared * squared))
     with np.errstate(invalid="ignore"):
         return Residuals(fourth / second**2, radius * np.sqrt(second), normal)
 
 
-def _in_frames(offset, distance):
+def in_frames(offset, distance):
     """Of such neighbours: normals (m,3) of the weighted principal planes and frames (m,2,3) in them; the terms x, y,
     xx, xy, yy, five (m,k); weights, and heights over the planes, (m,k)."""
-    weight = np.exp(np.float32(-_DECAY) * distance**2)
+    weight = weights_of(distance)
     normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
+    frame, basis, height = over_planes(offset, normal)
+    return normal, frame, basis, weight, height
+
+
+def weights_of(distance):
+    """Gaussian weights of neighbours at distances (m,k), in radii."""
+    return np.exp(np.float32(-_DECAY) * distance**2)
+
+
+def over_planes(offset, normal):
+    """Frames (m,2,3) in planes with normals (m,3) through samples whose neighbours have offsets, three (m,k); the terms
+    x, y, xx, xy, yy of these, five (m,k), and their heights (m,k)."""
     frame = tangent_frames(normal)
     axes = (axis.T[:, :, None].astype(np.float32) for axis in (frame[:, 0], frame[:, 1], normal))
     x, y, height = (dots(offset, axis) for axis in axes)
-    return normal, frame, (x, y, x * x, x * y, y * y), weight, height
+    return frame, (x, y, x * x, x * y, y * y), height
 
 
-def _off_fit(basis, weight, height):
-    """How far heights (m,k) are off the terms 1 and `basis` that fit them best."""
-    coefficients = _weighted_fit(basis, weight, height)[0].astype(np.float32)
+def onto_quadrics(coefficients, normal, frame, radius):
+    """Steps (m,3) from samples onto quadrics of `coefficients` (m,6) over planes with a `normal` (m,3) and a `frame`
+    (m,2,3), in radii (m,); their lengths (m,), and the unit normals (m,3) there."""
+    upright = normal - np.einsum("ma,mai->mi", coefficients[:, 1:3], frame)
+    squared = row_dots(upright, upright)
+    step = (radius * coefficients[:, 0] / squared)[:, None] * upright
+    steep = np.sqrt(squared)
+    return step, radius * np.abs(coefficients[:, 0]) / steep, upright / steep[:, None]
+
+
+def off_fit(coefficients, basis, height):
+    """How far heights (m,k) are off those that `coefficients` (m,6) of the terms 1 and `basis` give."""
+    coefficients = coefficients.astype(np.float32)
     residual = height - coefficients[:, :1]
     for a, term in enumerate(basis, start=1):
         residual -= coefficients[:, a, None] * term
@@ -186,9 +205,10 @@ def _least_spread(offset, share):
     return principal_axes(-np.stack(spread, axis=1))
 
 
-def _weighted_fit(basis, weight, height):
+def weighted_fit(basis, weight, height, stiffness=_STIFFNESS):
     """Coefficients (m,6) of the terms 1 and `basis`, five (m,k), that fit heights (m,k) best; the matrices (m,6,6) of
-    the normal equations, and (m,) what a sample at the origin counts in them."""
+    the normal equations, and (m,) what a sample at the origin counts in them. `stiffness`, one or (6,), holds the
+    coefficients back."""
     x, y, xx, xy, yy = basis
     full = 1.0 / np.einsum("mk->m", weight)
     share = weight * full[:, None]
@@ -197,5 +217,5 @@ def _weighted_fit(basis, weight, height):
     moments = [np.einsum("mk->m", term) for term in weighted]
     moments += [row_dots(by_xx, x), row_dots(by_xx, y), row_dots(by_yy, x), row_dots(by_yy, y)]
     moments += [row_dots(by_xx, xx), row_dots(by_xx, xy), row_dots(by_xx, yy), row_dots(by_xy, yy), row_dots(by_yy, yy)]
-    matrix = np.stack(moments, axis=1)[:, _MOMENTS] + _STIFFNESS * np.eye(_COEFFICIENTS)
+    matrix = np.stack(moments, axis=1)[:, _MOMENTS] + stiffness * np.eye(_COEFFICIENTS)
     return solve_positive(matrix, np.stack([row_dots(each, height) for each in weighted], axis=1)), matrix, full
