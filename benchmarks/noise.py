@@ -70,7 +70,8 @@ Every row is one run with default settings unless said otherwise, nothing is cho
 Gaussian noise in every coordinate, its standard deviation in per cent of the longest side.
 
 - *here*: `denoise="auto"`. Every sample is projected onto robust quadrics through its neighbours, as many as the data
-  ask for; none moves further than {longest:g} standard deviations of the noise estimated around it.
+  ask for, near edges and junctions those of one sheet; none moves further than
+  {longest:g} standard deviations of the noise estimated around it.
 - *alternation*: the paper's optimisation of positions and normals by turns (`benchmarks.alternation`), with its energy
   for the positions and the reflection sweeps for the normals, until the largest tenth of the changes of the axes
   average below {settled} (at most {rounds} rounds); then the rest of the method, on these positions and normals.

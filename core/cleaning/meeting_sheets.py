@@ -7,6 +7,8 @@ those (as votes for planes keep edges; S. Fleishman, D. Cohen-Or and C. Silva, A
 where the one found holds hardly more of the neighbours.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -14,8 +16,9 @@ from ..linalg import dots, row_dots
 from ..neighbourhoods.quadrics import in_frames, off_fit, onto_quadrics, over_planes, weighted_fit
 from ..parallel import even_chunks, work_through
 from ..progress import Progress
+from ..records import picked
 
-_SPREAD = 1.1  # levels of noise, that neighbours are off a quadric through all of them where it may not be of one sheet
+_SPREAD = 1.2  # levels of noise, that neighbours are off a quadric through all of them where it may not be of one sheet
 _NEIGHBOURS = 128  # at most
 _PLANES = 16  # of theirs that are tried, from near ones to far ones
 _WITHIN = 1.5  # levels of noise, beyond which a neighbour is off a sheet
@@ -43,43 +46,77 @@ def onto_one_sheet(points, rows, neighbours: int, fitted, level, progress=None) 
     def move(part):
         own = rows[chosen[part]]
         distance, near = tree.query(points[own], k=k)
-        radius = np.maximum(distance[:, -1], np.finfo(float).tiny)
-        held, there = _of_one_sheet(points, step, normal, own, near, distance, radius, _WITHIN * level[own] / radius)
-        found[chosen[part][held]] = there[held]
+        around = _Around.of(points, own, near, distance, level[own])
+        held, there = _onto_sheets(around, *_best_planes(around, points, step, normal))
+        found[chosen[part][held]] = there
 
     work_through(move, even_chunks(len(chosen), _CHUNK, Progress.of(progress)))
     return found
 
 
-def _of_one_sheet(points, step, normal, own, near, distance, radius, within):
-    """Which of samples `own` (m,) one sheet holds more neighbours of, `near` (m,k), than a quadric through all, (m,)
-    bool, and the steps onto that sheet, (m,3); within a distance (m,), in radii."""
-    offset = [((x[near] - x[own, None]) / radius[:, None]).astype(np.float32) for x in points.T]
-    _, _, basis, weight, height = in_frames(offset, (distance / radius[:, None]).astype(np.float32))
-    weight /= np.einsum("mk->m", weight)[:, None]
-    within = np.maximum(within, _EXACT)[:, None].astype(np.float32)
-    of_all = _held(off_fit(weighted_fit(basis, weight, height)[0], basis, height), weight, within)
+@dataclass(frozen=True)
+class _Around:
+    """What is around some samples; all lengths but those in units of the points are in radii, to the farthest.
 
-    best, plane, above = np.zeros(len(own)), np.zeros((len(own), 3)), np.zeros(len(own))
-    for other in near[:, np.linspace(1, near.shape[1] - 1, _PLANES).astype(int)].T:
+    own    : (m,) of the samples     near : (m,k), their neighbours     radius : (m,) float64, units of the points
+    offset : (m,3,k) float32, to the neighbours     weight : (m,k) float32, theirs, sum 1
+    within : (m,1) float32, how far off a sheet they may be
+    of_all : (m,) share of them that the quadric through all holds
+    """
+
+    own: np.ndarray
+    near: np.ndarray
+    radius: np.ndarray
+    offset: np.ndarray
+    weight: np.ndarray
+    within: np.ndarray
+    of_all: np.ndarray
+
+    @classmethod
+    def of(cls, points, own, near, distance, level) -> "_Around":
+        radius = np.maximum(distance[:, -1], np.finfo(float).tiny)
+        offset = np.stack([(x[near] - x[own, None]) / radius[:, None] for x in points.T], axis=1).astype(np.float32)
+        within = np.maximum(_WITHIN * level / radius, _EXACT)[:, None].astype(np.float32)
+        _, _, basis, weight, height = in_frames(offset.swapaxes(0, 1), (distance / radius[:, None]).astype(np.float32))
+        weight /= np.einsum("mk->m", weight)[:, None]
+        of_all = _held(off_fit(weighted_fit(basis, weight, height)[0], basis, height), weight, within)
+        return cls(own, near, radius, offset, weight, within, of_all)
+
+    @property
+    def columns(self) -> np.ndarray:
+        """The offsets component by component, (3,m,k)."""
+        return self.offset.swapaxes(0, 1)
+
+
+def _best_planes(around, points, step, normal):
+    """Of the planes of some neighbours, of their quadrics, those that hold most of all: normals (m,3), how far they are
+    above the samples, and the share of neighbours that they hold, (m,) each; this is 0 where no sample lies on one."""
+    best, plane, above = np.zeros(len(around.own)), np.zeros((len(around.own), 3)), np.zeros(len(around.own))
+    for other in around.near[:, np.linspace(1, around.near.shape[1] - 1, _PLANES).astype(int)].T:
         axis = normal[other]
-        over = row_dots(points[other] + step[other] - points[own], axis) / radius
-        held = _held(_heights(offset, axis) - over[:, None].astype(np.float32), weight, within)
-        better = axis.any(axis=1) & (held > best) & (np.abs(over) < within[:, 0])
+        over = row_dots(points[other] + step[other] - points[around.own], axis) / around.radius
+        held = _held(_heights(around, axis) - over[:, None].astype(np.float32), around.weight, around.within)
+        better = axis.any(axis=1) & (held > best) & (np.abs(over) < around.within[:, 0])
         best[better], plane[better], above[better] = held[better], axis[better], over[better]
+    return plane, above, best
 
-    row = np.flatnonzero(best > np.maximum(of_all - _LIKELY, 0))
-    steps, more = np.zeros((len(own), 3)), np.zeros(len(own), bool)
-    offset, weight, within, radius = [x[row] for x in offset], weight[row], within[row], radius[row]
-    frame, basis, height = over_planes(offset, plane[row])
-    residual = height - above[row, None].astype(np.float32)
+
+def _onto_sheets(around, plane, above, best):
+    """Rows (r,) of samples on one sheet that holds more of the neighbours than the quadric through all, and the steps
+    onto it, (r,3); from planes as :func:`_best_planes` finds them."""
+    likely = np.flatnonzero(best > np.maximum(around.of_all - _LIKELY, 0))
+    around, plane, above = picked(around, likely), plane[likely], above[likely]
+    frame, basis, height = over_planes(around.columns, plane)
+    residual = height - above[:, None].astype(np.float32)
     for _ in range(_ROUNDS):
-        on = np.maximum(1 - (residual / within) ** 2, 0) ** 2  # Tukey's biweight
-        coefficients = weighted_fit(basis, weight * on + np.finfo(np.float32).tiny, height, _STIFF)[0]
+        on = np.maximum(1 - (residual / around.within) ** 2, 0) ** 2  # Tukey's biweight
+        weight = around.weight * on + np.finfo(np.float32).tiny
+        coefficients = weighted_fit(basis, weight, height, _STIFF)[0]
         residual = off_fit(coefficients, basis, height)
-    steps[row], length, _ = onto_quadrics(coefficients, plane[row], frame, radius)
-    more[row] = (_held(residual, weight, within) > of_all[row] + _MORE) & (length < 2 * within[:, 0] * radius)
-    return more, steps
+    step, length, _ = onto_quadrics(coefficients, plane, frame, around.radius)
+    more = _held(residual, around.weight, around.within) > around.of_all + _MORE
+    more &= length < 2 * around.within[:, 0] * around.radius
+    return likely[more], step[more]
 
 
 def _held(residual, weight, within):
@@ -88,5 +125,5 @@ def _held(residual, weight, within):
     return np.einsum("mk,mk->m", weight, np.maximum(1 - (residual / within) ** 2, 0))
 
 
-def _heights(offset, axis):
-    return dots(offset, axis.T[:, :, None].astype(np.float32))
+def _heights(around, axis):
+    return dots(around.columns, axis.T[:, :, None].astype(np.float32))

@@ -2,7 +2,7 @@
 
 The paper alternates between normals and offsets along them (section 4.3, `benchmarks.alternation`) on the Voronoi
 diagram, which noise breaks first. Robust quadrics through the neighbours need no diagram, and their normals come with
-them.
+them; by these, edges stay (see :mod:`.meeting_sheets`).
 """
 
 import numpy as np
