@@ -7,12 +7,13 @@ from ..linalg import row_dots
 from ..trees import k_nearest
 from ..voronoi.facets import by_blocks
 from .anchors import some_samples
+from .surroundings import thickness
 
 _FEWEST, _ASKED = 256, 500  # samples
 _LEAST = 64  # neighbours: among fewer any noise fills a volume
 _FILLED = 2.5  # pointwise dimension; 2.55 to 2.9 in solids, 1.9 to 2.4 in noise of up to two spacings on surfaces
-_ROUND, _NEXT = 0.57, 12  # least over middle extent of a sample and those next to it; .68 to .82 in solids, .08 to .46
-# in stacks of sheets 2.5 spacings apart with noise of up to .3
+_THICK, _NEXT = 0.32, 12  # thickness over size of a sample and those next to it; .37 to .47 in solids, .04 to .26 in
+# stacks of sheets 2.4 spacings apart with noise of up to .3
 _AMONG = 32  # neighbours, of which noise has some far away, in its tails
 _EVEN = 0.125  # deviation of the logarithm of the radius that holds these; .08 to .113 in solids, .13 to .18 in noise
 # that drowns what is between surfaces
@@ -34,15 +35,8 @@ def fills_volume(points, neighbours: int, seed: int) -> tuple[bool, bool]:
     tree = KDTree(points)
     near, some, far = np.log(tree.query(asked, k=[least + 1, _AMONG + 1, most + 1], workers=-1)[0].T)
     widens = np.median(far - near) < np.log(most / least) / _FILLED
-    filled = widens and _are_round(points[k_nearest(tree, asked, _NEXT)[1]])
+    filled = widens and np.median(thickness(points[k_nearest(tree, asked, _NEXT)[1]])) > _THICK
     return bool(filled), bool(some.std() < _EVEN)
-
-
-def _are_round(groups):
-    """Whether groups of samples (m,k,3) are as thick as in a volume, most of them."""
-    away = groups - groups.mean(axis=1, keepdims=True)
-    least, middle, _ = np.linalg.eigvalsh(np.einsum("mki,mkj->mij", away, away)).T
-    return np.median(least / np.maximum(middle, np.finfo(float).tiny)) > _ROUND**2
 
 
 def bounds_volume(points, spacing, seed: int, progress=None) -> np.ndarray:

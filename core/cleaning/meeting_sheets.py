@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..linalg import dots, row_dots
-from ..neighbourhoods.quadrics import in_frames, off_fit, onto_quadrics, over_planes, weighted_fit
+from ..neighbourhoods.quadrics import EXACT, STIFFNESS, in_frames, off_fit, onto_quadrics, over_planes, weighted_fit
 from ..parallel import even_chunks, work_through
 from ..progress import Progress
 from ..records import picked
@@ -25,13 +25,13 @@ _WITHIN = 1.5  # levels of noise, beyond which a neighbour is off a sheet
 _MORE = 0.03  # of the neighbours, see :func:`_held`, that one sheet holds more than the quadric of all
 _LIKELY = 0.1  # of them, by which a plane may hold less than that, as the sheet through it may bend
 _ROUNDS = 3
-_STIFF = np.array([1e-6, 1e-6, 1e-6, 0.03, 0.03, 0.03])  # of 1, x, y, xx, xy, yy: a sheet seen on one side hardly bends
-_EXACT = 1e-6  # radii, less is rounding
+_STIFF = np.repeat([STIFFNESS, 0.03], 3)  # of 1, x, y and xx, xy, yy: a sheet seen on one side hardly bends
 _CHUNK = 2048  # samples
 
 
-def onto_one_sheet(points, rows, neighbours: int, fitted, level, progress=None) -> np.ndarray:
-    """Steps of samples `rows` (m,) of points (n,3) onto the quadrics of the sheets that they lie on, (m,3) float64.
+def onto_one_sheet(tree: KDTree, rows, neighbours: int, fitted, level, progress=None) -> np.ndarray:
+    """Steps of samples `rows` (m,) of the points (n,3) of a tree onto quadrics of the sheets that they lie on, (m,3)
+    float64.
 
     neighbours : that are looked at around each, 128 at most
     fitted     : steps and normals, (n,3) each, of quadrics through all neighbours, and the spread off these, (n,)
@@ -40,14 +40,14 @@ def onto_one_sheet(points, rows, neighbours: int, fitted, level, progress=None) 
     Those of samples on one sheet alone, by that spread or by the neighbours, are the fitted ones.
     """
     step, normal, spread = fitted
-    found, tree, k = step[rows], KDTree(points), min(neighbours, _NEIGHBOURS, len(points))
+    found, points, k = step[rows], tree.data, min(neighbours, _NEIGHBOURS, tree.n)
     chosen = np.flatnonzero(spread[rows] > _SPREAD * level[rows])
 
     def move(part):
         own = rows[chosen[part]]
         distance, near = tree.query(points[own], k=k)
         around = _Around.of(points, own, near, distance, level[own])
-        held, there = _onto_sheets(around, *_best_planes(around, points, step, normal))
+        held, there = _better_sheets(around, *_best_planes(around, points, step, normal))
         found[chosen[part][held]] = there
 
     work_through(move, even_chunks(len(chosen), _CHUNK, Progress.of(progress)))
@@ -76,7 +76,7 @@ class _Around:
     def of(cls, points, own, near, distance, level) -> "_Around":
         radius = np.maximum(distance[:, -1], np.finfo(float).tiny)
         offset = np.stack([(x[near] - x[own, None]) / radius[:, None] for x in points.T], axis=1).astype(np.float32)
-        within = np.maximum(_WITHIN * level / radius, _EXACT)[:, None].astype(np.float32)
+        within = np.maximum(_WITHIN * level / radius, EXACT)[:, None].astype(np.float32)
         _, _, basis, weight, height = in_frames(offset.swapaxes(0, 1), (distance / radius[:, None]).astype(np.float32))
         weight /= np.einsum("mk->m", weight)[:, None]
         of_all = _held(off_fit(weighted_fit(basis, weight, height)[0], basis, height), weight, within)
@@ -101,7 +101,7 @@ def _best_planes(around, points, step, normal):
     return plane, above, best
 
 
-def _onto_sheets(around, plane, above, best):
+def _better_sheets(around, plane, above, best):
     """Rows (r,) of samples on one sheet that holds more of the neighbours than the quadric through all, and the steps
     onto it, (r,3); from planes as :func:`_best_planes` finds them."""
     likely = np.flatnonzero(best > np.maximum(around.of_all - _LIKELY, 0))

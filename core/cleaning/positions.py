@@ -6,6 +6,7 @@ them; by these, edges stay (see :mod:`.meeting_sheets`).
 """
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..given_arrays import finite_points, spacing_of
 from ..linalg import shortened
@@ -75,11 +76,11 @@ def _onto_sheets(points, noisy, neighbours, level, progress):
     """Points moved onto quadrics through their neighbours, near edges onto those of one face, see
     :mod:`.meeting_sheets`."""
     step, normal, spread = np.zeros_like(points), np.zeros_like(points), np.zeros(len(points))
-    moved, clusters = points.copy(), Clusters(points)
+    moved, clusters, tree = points.copy(), Clusters(points), KDTree(points)
     sizes = [(int(k), np.flatnonzero(noisy & (neighbours == k))) for k in np.unique(neighbours[noisy])]
     for (k, rows), part in progress.part(0.0, 0.6).turns(sizes):
         fit = fit_quadrics(points, rows, k, part, clusters)
         step[rows], normal[rows], spread[rows] = fit.step, fit.normal, fit.spread
     for (k, rows), part in progress.part(0.6, 1.0).turns(sizes):
-        moved[rows] += onto_one_sheet(points, rows, k, (step, normal, spread), level, part)
+        moved[rows] += onto_one_sheet(tree, rows, k, (step, normal, spread), level, part)
     return moved

@@ -15,12 +15,12 @@ from ..records import joined
 from .clusters import Clusters
 
 GAUSS = 1.4826  # standard deviations in a median absolute error
+STIFFNESS = 1e-6  # of coefficients, in radii
+EXACT = np.float32(1e-6)  # residuals below this share of the radius are rounding
 
 _COEFFICIENTS = 6  # of 1, x, y, xx, xy, yy
 _DECAY = 3.0  # of the Gaussian weight at the farthest neighbour
 _CAUCHY = 2.0  # residuals above this many robust standard deviations lose weight
-_STIFFNESS = 1e-6
-_EXACT = np.float32(1e-6)  # residuals below this share of the radius are rounding
 _SINGLY = 200  # neighbours, above which the means of clusters stand for them
 _MEANS = 128  # of them then, at most, where all clusters are full
 _CHUNK, _QUERIED = 60_000, 300_000  # neighbours, fitted and asked for at a time
@@ -138,7 +138,7 @@ def _quadrics(offset, distance, radius):
     normal, frame, basis, weight, height = in_frames(offset, distance)
     residual = off_fit(weighted_fit(basis, weight, height)[0], basis, height)
     spread = np.float32(GAUSS) * np.median(np.abs(residual), axis=1)
-    weight = weight / (1 + (residual / np.maximum(np.float32(_CAUCHY) * spread[:, None], _EXACT)) ** 2)
+    weight = weight / (1 + (residual / np.maximum(np.float32(_CAUCHY) * spread[:, None], EXACT)) ** 2)
     coefficients, matrix, full = weighted_fit(basis, weight, height)
     step, height, normal = onto_quadrics(coefficients, normal, frame, radius)
     leverage = full * solve_positive(matrix, np.broadcast_to(np.eye(_COEFFICIENTS)[0], coefficients.shape))[:, 0]
@@ -158,15 +158,10 @@ def _residuals(offset, distance, radius):
 def in_frames(offset, distance):
     """Of such neighbours: normals (m,3) of the weighted principal planes and frames (m,2,3) in them; the terms x, y,
     xx, xy, yy, five (m,k); weights, and heights over the planes, (m,k)."""
-    weight = weights_of(distance)
+    weight = np.exp(np.float32(-_DECAY) * distance**2)
     normal = _least_spread(offset, weight / np.einsum("mk->m", weight)[:, None])
     frame, basis, height = over_planes(offset, normal)
     return normal, frame, basis, weight, height
-
-
-def weights_of(distance):
-    """Gaussian weights of neighbours at distances (m,k), in radii."""
-    return np.exp(np.float32(-_DECAY) * distance**2)
 
 
 def over_planes(offset, normal):
@@ -205,7 +200,7 @@ def _least_spread(offset, share):
     return principal_axes(-np.stack(spread, axis=1))
 
 
-def weighted_fit(basis, weight, height, stiffness=_STIFFNESS):
+def weighted_fit(basis, weight, height, stiffness=STIFFNESS):
     """Coefficients (m,6) of the terms 1 and `basis`, five (m,k), that fit heights (m,k) best; the matrices (m,6,6) of
     the normal equations, and (m,) what a sample at the origin counts in them. `stiffness`, one or (6,), holds the
     coefficients back."""

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from core.cleaning.meeting_sheets import onto_one_sheet
 from core.cleaning.positions import denoise
@@ -39,7 +40,7 @@ def test_samples_beside_an_edge_come_closer_to_its_faces(degrees, share):
     beside = (np.hypot(points[:, 0], points[:, 1]) < 4 * h) & (np.abs(points[:, 2] - 0.5) < 0.4)
     every, level = np.arange(len(points)), np.full(len(points), 0.2 * h)
     fit = fitted(points, every, 48)
-    moved = points + onto_one_sheet(points, every, 48, fit, level)
+    moved = points + onto_one_sheet(KDTree(points), every, 48, fit, level)
     error, before = (np.sqrt(np.mean(off_wedge(x[beside], degrees) ** 2)) for x in (moved, points + fit[0]))
     assert error < share * before
 
@@ -57,7 +58,7 @@ def test_smooth_surfaces_keep_their_quadrics():
     points += 0.3 * np.median(local_spacing(points)) * np.random.default_rng(0).normal(size=points.shape)
     every, level = np.arange(4000), np.full(4000, 0.3 * np.median(local_spacing(points)))
     fit = fitted(points, every, 64)
-    step = onto_one_sheet(points, every, 64, fit, level)
+    step = onto_one_sheet(KDTree(points), every, 64, fit, level)
     assert (step != fit[0]).any(axis=1).mean() < 0.02
 
 
@@ -66,7 +67,7 @@ def test_samples_without_a_quadric_are_no_sheet():
     points = wedge(60, n=3000, noise=0.2)
     rows = np.flatnonzero(points[:, 2] < 0.5)
     level = np.full(3000, 0.2 * np.median(local_spacing(points)))
-    step = onto_one_sheet(points, rows, 32, fitted(points, rows, 32), level)
+    step = onto_one_sheet(KDTree(points), rows, 32, fitted(points, rows, 32), level)
     assert step.shape == (len(rows), 3)
     assert np.linalg.norm(step, axis=1).max() < 10 * level[0]
 
@@ -74,8 +75,8 @@ def test_samples_without_a_quadric_are_no_sheet():
 def test_turning_and_scaling_carry_over():
     points, turn = wedge(60, n=2000, noise=0.2), shapes.random_rotation(3)
     every, level = np.arange(2000), np.full(2000, 0.2 * np.median(local_spacing(points)))
-    here = onto_one_sheet(points, every, 32, fitted(points, every, 32), level)
+    here = onto_one_sheet(KDTree(points), every, 32, fitted(points, every, 32), level)
     turned = 8 * points @ turn.T
-    there = onto_one_sheet(turned, every, 32, fitted(turned, every, 32), 8 * level)
+    there = onto_one_sheet(KDTree(turned), every, 32, fitted(turned, every, 32), 8 * level)
     alike = np.linalg.norm(there - 8 * here @ turn.T, axis=1) < 0.1 * level[0]
     assert alike.mean() > 0.99  # rounding decides for few
