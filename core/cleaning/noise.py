@@ -11,7 +11,7 @@ from .anchors import SMOOTHING, nearest_anchor, some_samples
 from .averaged import cells_of_means
 from .flat_patches import shows_flat_patches
 from .roughness import least_part, roughness
-from .thin_walls import is_shift, two_sheets
+from .thin_walls import find_sheets
 from .voxels import Voxels, find_voxels
 
 _FEWEST = 100  # samples; fewer say nothing about noise
@@ -70,15 +70,14 @@ def noisy_samples(points, spacing, seed: int = 0, progress=None, voxels: Voxels 
 
 def _seems_only(points, spacing, anchors, amid, level, seed, progress):
     """Whether samples that seem to have noise of `level` local spacings at some anchors have none. Where they show
-    two sheets, as of thin walls, they have none unless these are two scans shifted against each other, or means of
-    cells as wide as the sheets are apart; elsewhere they have none if they lie on flat faces. Those are looked for at
-    the anchors `amid` alone: beside noise a smooth surface looks flat."""
-    sheets = two_sheets(points, spacing, anchors, level, progress)
+    two sheets, as of thin walls, they have none unless these are scans shifted against each other, or means of cells as
+    wide as the sheets are apart; elsewhere they have none if they lie on flat faces. Those are looked for at the
+    anchors `amid` alone: beside noise a smooth surface looks flat."""
+    sheets = find_sheets(points, spacing, anchors, level, progress)
     if sheets is None:
         return shows_flat_patches(points, spacing, amid, level)
-    half, normal = sheets
     cell = cells_of_means(points, spacing, seed)
-    return (cell is None or np.median(half) > 0.5 * cell) and not is_shift(half, normal)
+    return (cell is None or sheets.typical_half > 0.5 * cell) and not sheets.are_scans()
 
 
 def _noisy_anchors(points, spacing, found, voxels, seed, progress):

@@ -1,5 +1,7 @@
 """Thin walls, told from noise: samples of two close sheets look noisy, but lie on the one or the other."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -13,14 +15,54 @@ _LEAST = 0.08  # local spacings, half the distance of two sheets, at least: clos
 _SEEN = 0.05  # local spacings, half the distance of two sheets that say whether there is a shift, at least
 _MOST = 2.0  # times the noise there seems to be, at most: walls farther apart do not look like that
 _SHARE = 0.015  # of the anchors, at least, near two sheets; on noise of .1 to 1.5 spacings at most .005 are
-_SHIFTED = 0.35  # times the squared errors of one distance all over, below which a shift explains them
-_AXES, _DIVERSE = 3, 0.1  # normals along few axes leave hardly this share of the largest singular value in the fourth
+_NEARLY_ALL = 0.4  # of the anchors that see errors as large, near two sheets, from which on these are of two scans
+# Of two scans and of more: the fourth of the singular values over the first, which few directions leave less of; and
+# the squared errors over those of one distance all over, below which a shift explains them.
+_TWO_SCANS, _MORE_SCANS = (0.1, 0.35), (0.35, 0.8)
 _TWICE = np.array([1, 1, 1, 2, 2, 2])  # how often a product of two components stands in a symmetric form
 
 
-def two_sheets(points, spacing, anchors, level: float, progress=None) -> tuple[np.ndarray, np.ndarray] | None:
-    """Half the distances (w,) between two sheets, and normals (w,3), at those anchors around which samples (n,3) lie
-    sharply on one sheet or the other, as those of thin walls do; None where too few are like that.
+@dataclass(frozen=True)
+class Sheets:
+    """What anchors see that are as far off the surface as sheets may be that look like noise.
+
+    half   : (w,) float64, how far the samples around each are off it, root mean square: half the distance of two sheets
+    normal : (w,3) float64, unit normals     two : (w,) bool, around which samples lie sharply on one sheet or the other
+    """
+
+    half: np.ndarray
+    normal: np.ndarray
+    two: np.ndarray
+
+    @property
+    def typical_half(self) -> float:
+        """The median half distance of two sheets."""
+        return float(np.median(self.half[self.two]))
+
+    def are_scans(self) -> bool:
+        """Whether these are scans of one surface, shifted against each other, and no walls.
+
+        Two scans show two sheets nearly all over, which are as far apart as the shift is long along the normal; walls
+        are as thick one way as the other. More scans, or noisy ones, show two sheets here and there alone, but what
+        they are off their mean, squared, is a quadratic form of the normal: the covariance of the shifts. With few
+        directions a shift may fit walls, too: no then."""
+        of_two = self.two.mean() > _NEARLY_ALL
+        diverse, explained = _TWO_SCANS if of_two else _MORE_SCANS
+        chosen = self.two if of_two else slice(None)
+        half, products = self.half[chosen], outer(self.normal[chosen]) * _TWICE
+        form, _, _, kinds = np.linalg.lstsq(products, half**2, rcond=None)
+        if kinds[3] < diverse * kinds[0]:
+            return False
+        if of_two:
+            axis = outer(principal_axes(form[None]))[0]
+            form = max(axis @ (_TWICE * form), 0.0) * axis
+        off = half - np.sqrt(np.maximum(products @ form, 0))
+        return bool(off @ off < explained * len(half) * half.var())
+
+
+def find_sheets(points, spacing, anchors, level: float, progress=None) -> Sheets | None:
+    """Two sheets around those anchors where samples (n,3) lie sharply on one or the other, as those of thin walls do;
+    None where too few are like that.
 
     points  : (n,3) float64, n > 32     spacing : (n,) float64, local spacing, same units
     anchors : (m,) int, rows that look noisy
@@ -30,23 +72,10 @@ def two_sheets(points, spacing, anchors, level: float, progress=None) -> tuple[n
     around = KDTree(points[anchors]).query(points[anchors], k=min(_AROUND, len(anchors)), workers=-1)[1]
     kurtosis = np.stack([np.median(fit.kurtosis[around], axis=1) for fit in fits])
     best, row = np.nan_to_num(kurtosis, nan=np.inf).argmin(axis=0), np.arange(len(anchors))
-    half = np.stack([fit.level for fit in fits])[best, row]
+    half, normal = (np.stack([getattr(fit, name) for fit in fits])[best, row] for name in ("level", "normal"))
     relative = half / spacing[anchors]
-    two = (kurtosis[best, row] < _TWO) & (relative > _SEEN) & (relative < _MOST * level)
+    near = (relative > _SEEN) & (relative < _MOST * level)
+    two = near & (kurtosis[best, row] < _TWO)
     if (two & (relative > _LEAST)).sum() < max(_AROUND, _SHARE * len(two)):
         return None
-    return half[two], np.stack([fit.normal for fit in fits])[best, row][two]
-
-
-def is_shift(half: np.ndarray, normal: np.ndarray) -> bool:
-    """Whether two sheets with half the distances (w,) and normals (w,3) are two scans of one surface, shifted against
-    each other: these are as far apart as the shift is long along the normal, walls all over alike. With few directions
-    a shift may fit walls, too: no then."""
-    products = outer(normal) * _TWICE
-    squares, _, _, kinds = np.linalg.lstsq(products, half**2, rcond=None)
-    if kinds[_AXES] < _DIVERSE * kinds[0]:
-        return False
-    axis = principal_axes(squares[None])
-    squared = max(((outer(axis) * _TWICE) @ squares).item(), 0.0)
-    off = half - np.abs(normal @ axis[0]) * np.sqrt(squared)
-    return off @ off < _SHIFTED * len(half) * half.var()
+    return Sheets(half[near], normal[near], two[near])

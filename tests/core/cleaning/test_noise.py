@@ -150,6 +150,33 @@ def test_shifted_scans_are_noisy_as_a_whole(height, share):
     assert noisy_samples(points, local_spacing(points)).all()
 
 
+def shifted_scans(points, count, share):
+    """Points at random of one of several scans, each shifted its own way by `share` local spacings."""
+    random = np.random.default_rng(4)
+    shifts = random.normal(size=(count, 3))
+    shifts *= share * np.median(local_spacing(points)) / np.linalg.norm(shifts, axis=1)[:, None]
+    return points + shifts[random.integers(count, size=len(points))]
+
+
+@pytest.mark.parametrize(("count", "share"), [(3, 0.2), (3, 0.4), (4, 0.4), (5, 0.4)])
+def test_more_than_two_shifted_scans_are_noisy_as_a_whole(count, share):
+    """Though they show two sheets where two groups of them lie apart along the normal."""
+    points = bumpy(5000, 0.2) * [1.0, 0.7, 0.5]
+    assert not noisy_samples(points, local_spacing(points)).any()
+    points = shifted_scans(points, count, share)
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
+def test_shifted_scans_with_some_noise_are_noisy():
+    """Few of their samples lie sharply on one of two sheets."""
+    points = bumpy(6000, 0.2)
+    spacing = np.median(local_spacing(points))
+    second = np.random.default_rng(1).random(len(points)) < 0.5
+    points[second] += 0.4 * spacing * np.array([0.3, 0.4, 0.866])
+    points = noisy(points, 0.05 * spacing)
+    assert noisy_samples(points, local_spacing(points)).all()
+
+
 def test_shifted_scans_of_flat_faces_are_noisy():
     """Though every point lies on a face of one of them."""
     golden = (1 + np.sqrt(5)) / 2
@@ -178,12 +205,53 @@ def test_thin_walls_are_no_noise(share):
     assert not noisy_samples(points, local_spacing(points)).any()
 
 
+@pytest.mark.parametrize("axes", [(1.0, 0.7, 0.5), (1.0, 1.0, 0.4), (1.0, 0.4, 0.4)])
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_walls_between_a_shape_and_its_copy_in_another_size_are_no_noise(axes, share):
+    """The squares of their thickness are a quadratic form of the normal, as if of many shifted scans."""
+    points = shapes.scattered_sphere(6000) * axes
+    sign = np.random.default_rng(1).choice([-0.5, 0.5], len(points))
+    points *= (1 + sign * share * np.median(local_spacing(points)))[:, None]
+    assert looks_noisy(points, local_spacing(points))
+    assert not noisy_samples(points, local_spacing(points)).any()
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_walls_of_a_bumpy_shape_are_no_noise(share):
+    """Few anchors there see two sheets, since the walls bend, but thickness has nothing to do with the normal."""
+    ball, points = shapes.scattered_sphere(6000), bumpy(6000, 0.2)
+    sines, cosines = (wave(5 * ball + [0, 0, 1]) for wave in (np.sin, np.cos))
+    slope = cosines * np.roll(sines, 1, axis=1) * np.roll(sines, 2, axis=1)
+    radial = (points * ball).sum(axis=1, keepdims=True) + (slope * ball).sum(axis=1, keepdims=True)
+    normals = radial * ball - slope
+    points = walled(points, normals / np.linalg.norm(normals, axis=1)[:, None], share)
+    assert looks_noisy(points, local_spacing(points))
+    assert not noisy_samples(points, local_spacing(points)).any()
+
+
 def test_walls_of_two_thicknesses_are_no_noise():
     """A shift would fit a base and a lid of any thickness."""
     floor = shapes.square(4000) + np.array([1.0, 0, 0])
     base, lid = (walled(floor, np.array([0, 0, 1.0]), share) for share in (0.3, 0.5))
     points = np.concatenate([base, Rotation.from_euler("y", -120, degrees=True).apply(lid)])
     assert looks_noisy(points, local_spacing(points))
+    assert not noisy_samples(points, local_spacing(points)).any()
+
+
+def shelf(thickness, n):
+    """About n random points, even over five boards between two sides, and a back half as thick as these."""
+    boards = [((1.0, 0.4, thickness), (0.0, 0.0, z)) for z in np.linspace(0, 1.2, 5)]
+    sides = [((thickness, 0.4, 1.2), (x, 0.0, 0.0)) for x in (0.0, 1.0)]
+    parts = [*boards, *sides, ((1.0, 0.5 * thickness, 1.2), (0.0, 0.4, 0.0))]
+    areas = np.array([x * y + y * z + z * x for (x, y, z), _ in parts])
+    counts = np.rint(n * areas / areas.sum()).astype(int)
+    boxes = [shapes.scattered_box(m, size) + place for m, (size, place) in zip(counts, parts, strict=True)]
+    return np.concatenate(boxes) @ shapes.random_rotation(1).T
+
+
+def test_walls_of_furniture_are_no_noise():
+    """Few anchors see two sheets, and thickness goes with the normal, of which there are three kinds."""
+    points = shelf(0.018, 9000)
     assert not noisy_samples(points, local_spacing(points)).any()
 
 
