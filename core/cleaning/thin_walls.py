@@ -15,7 +15,7 @@ _LEAST = 0.08  # local spacings, half the distance of two sheets, at least: clos
 _SEEN = 0.05  # local spacings, half the distance of two sheets that say whether there is a shift, at least
 _MOST = 2.0  # times the noise there seems to be, at most: walls farther apart do not look like that
 _SHARE = 0.015  # of the anchors, at least, near two sheets; on noise of .1 to 1.5 spacings at most .005 are
-_NEARLY_ALL = 0.4  # of the anchors that see errors as large, near two sheets, from which on these are of two scans
+_OFTEN = 0.4  # of the anchors with errors as large, near two sheets, above which they are of two scans, or of walls
 # Of two scans and of more: the fourth of the singular values over the first, which few directions leave less of; and
 # the squared errors over those of one distance all over, below which a shift explains them.
 _TWO_SCANS, _MORE_SCANS = (0.1, 0.35), (0.35, 0.8)
@@ -46,7 +46,7 @@ class Sheets:
         are as thick one way as the other. More scans, or noisy ones, show two sheets here and there alone, but what
         they are off their mean, squared, is a quadratic form of the normal: the covariance of the shifts. With few
         directions a shift may fit walls, too: no then."""
-        of_two = self.two.mean() > _NEARLY_ALL
+        of_two = self.two.mean() > _OFTEN
         diverse, explained = _TWO_SCANS if of_two else _MORE_SCANS
         chosen = self.two if of_two else slice(None)
         half, products = self.half[chosen], outer(self.normal[chosen]) * _TWICE
