@@ -11,7 +11,7 @@ from .anchors import SMOOTHING, nearest_anchor, some_samples
 from .averaged import cells_of_means
 from .flat_patches import shows_flat_patches
 from .roughness import least_part, roughness
-from .thin_walls import find_sheets
+from .thin_walls import find_two_sheets
 from .voxels import Voxels, find_voxels
 
 _FEWEST = 100  # samples; fewer say nothing about noise
@@ -73,7 +73,7 @@ def _seems_only(points, spacing, anchors, amid, level, seed, progress):
     two sheets, as of thin walls, they have none unless these are scans shifted against each other, or means of cells as
     wide as the sheets are apart; elsewhere they have none if they lie on flat faces. Those are looked for at the
     anchors `amid` alone: beside noise a smooth surface looks flat."""
-    sheets = find_sheets(points, spacing, anchors, level, progress)
+    sheets = find_two_sheets(points, spacing, anchors, level, progress)
     if sheets is None:
         return shows_flat_patches(points, spacing, amid, level)
     cell = cells_of_means(points, spacing, seed)

@@ -23,7 +23,7 @@ _TWICE = np.array([1, 1, 1, 2, 2, 2])  # how often a product of two components s
 
 
 @dataclass(frozen=True)
-class Sheets:
+class TwoSheets:
     """What anchors see that are as far off the surface as sheets may be that look like noise.
 
     half   : (w,) float64, how far the samples around each are off it, root mean square: half the distance of two sheets
@@ -60,7 +60,7 @@ class Sheets:
         return bool(off @ off < explained * len(half) * half.var())
 
 
-def find_sheets(points, spacing, anchors, level: float, progress=None) -> Sheets | None:
+def find_two_sheets(points, spacing, anchors, level: float, progress=None) -> TwoSheets | None:
     """Two sheets around those anchors where samples (n,3) lie sharply on one or the other, as those of thin walls do;
     None where too few are like that.
 
@@ -78,4 +78,4 @@ def find_sheets(points, spacing, anchors, level: float, progress=None) -> Sheets
     two = near & (kurtosis[best, row] < _TWO)
     if (two & (relative > _LEAST)).sum() < max(_AROUND, _SHARE * len(two)):
         return None
-    return Sheets(half[near], normal[near], two[near])
+    return TwoSheets(half[near], normal[near], two[near])

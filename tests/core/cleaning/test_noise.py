@@ -140,13 +140,18 @@ def bumpy(n, height):
     return np.column_stack([x, y, z]) / 5 * (1 + height * np.sin(x) * np.sin(y) * np.sin(z + 1))[:, None]
 
 
+def two_scans(points, share):
+    """Points at random of one of two scans, `share` local spacings apart in one direction."""
+    second = np.random.default_rng(1).random(len(points)) < 0.5
+    return points + np.outer(second, share * np.median(local_spacing(points)) * np.array([0.3, 0.4, 0.866]))
+
+
 @pytest.mark.parametrize(("height", "share"), [(0.0, 0.1), (0.0, 0.3), (0.2, 0.2), (0.2, 0.3)])
 def test_shifted_scans_are_noisy_as_a_whole(height, share):
     """Though they agree where the shift runs along the surface, and what shows there is detail."""
     points = bumpy(5000, height)
     assert not noisy_samples(points, local_spacing(points)).any()
-    second = np.random.default_rng(1).random(len(points)) < 0.5
-    points[second] += share * np.median(local_spacing(points)) * np.array([0.3, 0.4, 0.866])
+    points = two_scans(points, share)
     assert noisy_samples(points, local_spacing(points)).all()
 
 
@@ -170,10 +175,7 @@ def test_more_than_two_shifted_scans_are_noisy_as_a_whole(count, share):
 def test_shifted_scans_with_some_noise_are_noisy():
     """Few of their samples lie sharply on one of two sheets."""
     points = bumpy(6000, 0.2)
-    spacing = np.median(local_spacing(points))
-    second = np.random.default_rng(1).random(len(points)) < 0.5
-    points[second] += 0.4 * spacing * np.array([0.3, 0.4, 0.866])
-    points = noisy(points, 0.05 * spacing)
+    points = noisy(two_scans(points, 0.4), 0.05 * np.median(local_spacing(points)))
     assert noisy_samples(points, local_spacing(points)).all()
 
 
@@ -184,8 +186,7 @@ def test_shifted_scans_of_flat_faces_are_noisy():
     ball = shapes.scattered_sphere(5000)
     points = ball / np.abs(ball @ np.transpose(axes)).max(axis=1)[:, None]
     assert not noisy_samples(points, local_spacing(points)).any()
-    second = np.random.default_rng(1).random(len(points)) < 0.5
-    points[second] += 0.4 * np.median(local_spacing(points)) * np.array([0.3, 0.4, 0.866])
+    points = two_scans(points, 0.4)
     assert shows_flat_patches(points, local_spacing(points), np.arange(0, 5000, 2), 0.1)
     assert noisy_samples(points, local_spacing(points)).all()
 
@@ -222,8 +223,7 @@ def test_walls_of_a_bumpy_shape_are_no_noise(share):
     ball, points = shapes.scattered_sphere(6000), bumpy(6000, 0.2)
     sines, cosines = (wave(5 * ball + [0, 0, 1]) for wave in (np.sin, np.cos))
     slope = cosines * np.roll(sines, 1, axis=1) * np.roll(sines, 2, axis=1)
-    radial = (points * ball).sum(axis=1, keepdims=True) + (slope * ball).sum(axis=1, keepdims=True)
-    normals = radial * ball - slope
+    normals = ((points + slope) * ball).sum(axis=1, keepdims=True) * ball - slope
     points = walled(points, normals / np.linalg.norm(normals, axis=1)[:, None], share)
     assert looks_noisy(points, local_spacing(points))
     assert not noisy_samples(points, local_spacing(points)).any()
