@@ -34,24 +34,39 @@ def cells_of_means(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> fl
     step = 1.0 / (_PER_TURN * np.ptp(points, axis=0).max())
     frequency, phase = _wave(here, np.median(spacing), step)
     near = points[k_nearest(KDTree(points), here, _NEAREST + 1)[1][:, 1:]]
+    one, other = np.repeat(here.T, _NEAREST, axis=1), near.reshape(-1, 3).T
+    longest = 1.0 / max(frequency - _ROUNDS * step, np.finfo(float).tiny)
+    every = np.flatnonzero((np.abs(one - other) < longest).all(axis=0))
 
-    def together(cells):
-        """Share of the pairs of neighbours that are in one of cells of a side with a corner at an origin."""
-        side, origin = cells
-        cell, others = np.floor((here - origin) / side), np.floor((near - origin) / side)
-        return (cell[:, None] == others).all(axis=2).mean()
+    def in_one(side, origin, axes, pairs=every):
+        """Those of the pairs that lie in one of cells of a side with a corner at an origin, along some axes."""
+        for k in axes:
+            pairs = pairs[_cell(one[k, pairs], origin[k], side) == _cell(other[k, pairs], origin[k], side)]
+        return pairs
+
+    def together(side, origin):
+        return len(in_one(side, origin, range(3))) / one.shape[1]
 
     middle = here.mean(axis=0)
     side = 1.0 / frequency
-    cells = side, side * (phase - 0.5 + np.rint(middle / side))
+    origin = side * (phase - 0.5 + np.rint(middle / side))
     for _ in range(_ROUNDS):
-        for axis in np.eye(3):
-            cells = min([cells, *((cells[0], cells[1] + aside * cells[0] * axis) for aside in _ASIDE)], key=together)
-        longer = [1.0 / (1.0 / cells[0] + step * finer) for finer in _FINER]
-        cells = min([cells, *((side, middle + (cells[1] - middle) * side / cells[0]) for side in longer)], key=together)
-    side, origin = cells
-    found = together((side, origin)) < _TOGETHER and together((side, origin + 0.5 * side)) > _SHIFTED
+        placed = origin
+        for axis in range(3):
+            pairs = in_one(side, origin, {0, 1, 2} - {axis})
+            moved = [origin, *(origin + aside * side * np.eye(3)[axis] for aside in _ASIDE)]
+            origin = min(moved, key=lambda at: len(in_one(side, at, [axis], pairs)))
+        longer = [1.0 / (1.0 / side + step * finer) for finer in _FINER]
+        resized = [(side, origin), *((new, middle + (origin - middle) * new / side) for new in longer)]
+        side, origin = min(resized, key=lambda cells: together(*cells))
+        if origin is placed:
+            break
+    found = together(side, origin) < _TOGETHER and together(side, origin + 0.5 * side) > _SHIFTED
     return side if found else None
+
+
+def _cell(x, origin, side):
+    return np.floor((x - origin) / side)
 
 
 def _wave(points, spacing, step):
