@@ -58,9 +58,9 @@ class Choice:
 
     @property
     def is_cover_better(self) -> bool:
-        """Whether the single layer is torn, and the double cover is not."""
+        """Whether the single layer is torn, and the double cover neither is nor has its sides."""
         worst = self.best_single[2][0]
-        return worst > 1 and self.cover_fit[0] < BETTER * worst
+        return worst > 1 and not self.is_of_sheet and self.extracted_fit[0] < BETTER * worst
 
     @cached_property
     def cover(self) -> Mesh:
@@ -82,7 +82,7 @@ class Choice:
         looked = self._may_be_sheet()
         if looked and self._is_whole():
             (worst, _), _ = side_by_side(lambda: self.single.misfit, lambda: self.both_sides)
-            if worst <= (ROUGH if self.meetings.side_by_side else 1):
+            if worst <= 1 and not self.single.is_rough:
                 return True
         return (looked or self._is_rough()) and self._is_closer()
 
@@ -96,9 +96,14 @@ class Choice:
 
     def _is_closer(self):
         """Whether both sides of the single layer are closer to the surface than the extracted double cover, and do not
-        miss ends of it that this shows."""
-        both, cover = (chamfer(mesh, self.local, self.grid.spacing) for mesh in (self.both_sides, self.extracted))
-        return both < cover and self.single.misfit[1] - self.extracted_fit[1] <= SHOWN
+        miss ends of it that this shows. They may take long to find, so the single layer itself is asked first."""
+        if self.single.misfit[1] - self.extracted_fit[1] > SHOWN:
+            return False
+        cover = self._off(self.extracted)
+        return self._off(self.single.sheet[0]) < cover and self._off(self.both_sides) < cover
+
+    def _off(self, mesh):
+        return chamfer(mesh, self.local, self.grid.spacing)
 
     @cached_property
     def both_sides(self) -> Mesh:

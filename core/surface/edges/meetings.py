@@ -32,9 +32,10 @@ _LEVEL = 0.3  # volume that the normals of such sheets span, at most
 _CHUNK = 8192  # samples
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood, on two sheets where these meet
 _WEAK, _NEXT = 0.15, 8  # that share where samples connect to such ones, by so many of the nearest each
-_FEW = 0.005  # of all samples, at meetings, beside others, or that show no line: as few may be chance
+FEW = 0.005  # of all samples, at meetings, beside others, or that show no line: as few may be chance
 _THROUGH = 0.125  # of the samples at meetings: as many on sheets that pass through one another are no chance
 _BESIDE = 0.05  # of the samples at meetings: more beside another sheet tear single layers
+_MOSTLY = 0.5  # of them: of thick shapes at most .47, where most walls or slits are thin .59 and more
 _LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all around, at least
 _PASSING = 24  # samples around one, with such a sample among which it is close to the line
 
@@ -57,12 +58,12 @@ class Meetings:
     @property
     def few(self) -> bool:
         """Whether so few of all samples are at meetings that these may be chance."""
-        return bool(self.at.mean() <= _FEW)
+        return bool(self.at.mean() <= FEW)
 
     @property
     def pass_through(self) -> bool:
         """Whether sheets pass through one another, and do not only look like that by chance."""
-        many = self.passing.any() or self.through.mean() > _FEW
+        many = self.passing.any() or self.through.mean() > FEW
         return bool(many and not self.few and self._share(self.through) >= _THROUGH)
 
     @property
@@ -70,14 +71,20 @@ class Meetings:
         """Whether sheets run so close beside each other that single layers are torn there."""
         return not self.few and bool(self._share(self.beside) > _BESIDE)
 
+    @property
+    def mostly_side_by_side(self) -> bool:
+        """Whether most meetings are of sheets that run so close, as in thin walls and slits; creases and tight bends
+        of thick shapes may look like some."""
+        return self.side_by_side and bool(self._share(self.beside) > _MOSTLY)
+
     def adds_to(self, others: "Meetings") -> bool:
         """Whether more samples are at these meetings than at others, and not so few that they may be chance."""
-        return bool((self.at & ~others.at).mean() > _FEW)
+        return bool((self.at & ~others.at).mean() > FEW)
 
     def with_beside(self, others: np.ndarray) -> "Meetings":
         """These and samples (n,) bool known to be beside another sheet; these alone where so few are new that they may
         be chance."""
-        if (others & ~self.beside).mean() <= _FEW:
+        if (others & ~self.beside).mean() <= FEW:
             return self
         return replace(self, at=self.at | others, beside=self.beside | others)
 

@@ -108,9 +108,12 @@ def _close(corners, asked):
         tree, reach = quick_tree(centre[others]), radius[others].max(initial=0.0)
         for part in np.split(row, range(_AT_ONCE, len(row), _AT_ONCE)):
             near = tree.query_ball_point(centre[part], radius[part] + reach, workers=-1)
-            other = others[np.fromiter(chain.from_iterable(near), np.intp)]
-            one = np.repeat(part, [len(each) for each in near])
-            kept = (np.maximum(low[:, one], low[:, other]) <= np.minimum(high[:, one], high[:, other])).all(axis=0)
-            kept &= (one < other) | ~asked[other]
+            count = np.fromiter(map(len, near), np.intp, len(part))
+            other = others.take(np.fromiter(chain.from_iterable(near), np.intp, count.sum()))
+            one = np.repeat(part, count)
+            kept = np.flatnonzero((one < other) | ~asked.take(other))
+            for least, most in zip(low, high, strict=True):
+                a, b = one.take(kept), other.take(kept)
+                kept = kept[(least.take(a) <= most.take(b)) & (least.take(b) <= most.take(a))]
             pairs.append(np.stack([one[kept], other[kept]]))
     return np.concatenate(pairs, axis=1)

@@ -15,7 +15,7 @@ from ...settings import Settings
 from ..double.double_cover import double_cover
 from ..edges.close_walls import beside_within_cells
 from ..edges.crossings import Crossings, find_crossings
-from ..edges.meetings import Meetings, find_meetings
+from ..edges.meetings import FEW, Meetings, find_meetings
 from ..mesh import Mesh
 from ..meshing.misfit import BETTER, ROUGH, SHOWN, misfit
 from ..signs.sides import Sides, find_sides
@@ -128,8 +128,10 @@ class SingleLayer:
 
     @property
     def is_rough(self) -> bool:
-        """Whether sheets run side by side, and it goes to and fro between them."""
-        return self.meetings.side_by_side and self.misfit[0] > ROUGH
+        """Whether sheets run side by side, and it goes to and fro between them, or is torn where it bounds an inside
+        and most of its meetings are not of such sheets."""
+        parted = self.sides.complete and not self.meetings.mostly_side_by_side
+        return self.meetings.side_by_side and self.misfit[0] > (1 if parted else ROUGH)
 
     def told_apart(self) -> "SingleLayer":
         """This, or where it is rough the one with sheets told apart by their room, if that is better:
@@ -139,7 +141,7 @@ class SingleLayer:
 
         It never takes the place of what lies between two sides. That has no lines of more than two faces, and it may
         have some along creases."""
-        if not self.is_rough or self.between is not None or np.isinf(self.local.room).all():
+        if not self.is_rough or self.between is not None or np.isfinite(self.local.room).mean() <= FEW:
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))
         if not other.meetings.adds_to(self.meetings):
