@@ -72,16 +72,16 @@ def _without_crossings(mesh, before, asked, smooth):
 def crossing_faces(mesh: Mesh, asked: np.ndarray) -> np.ndarray:
     """Pairs (2,p) of faces that pass through each other, at least one of them among those `asked`, (f,) bool. Faces
     that share an edge count as none that do."""
-    corners = np.stack(at_corners(mesh.vertices, mesh.faces))
+    corners, faces = np.stack(at_corners(mesh.vertices, mesh.faces)), mesh.faces.T
     one, other = _close(corners, asked)
-    same = mesh.faces[one][:, :, None] == mesh.faces[other][:, None, :]
-    apart = same.sum(axis=(1, 2)) < 2
-    one, other, same = one[apart], other[apart], same[apart]
-    normal = face_normals(*corners)
-    over = [_heights(normal[:, one], corners[:, :, other] - corners[0][:, one], same.any(axis=1).T)]
-    over.append(_heights(normal[:, other], corners[:, :, one] - corners[0][:, other], same.any(axis=2).T))
-    cut = np.all([(each.min(axis=0) < 0) & (each.max(axis=0) > 0) for each in over], axis=0)
-    one, other, over = one[cut], other[cut], [each[:, cut] for each in over]
+    same = faces.take(one, axis=1)[:, None] == faces.take(other, axis=1)
+    pair = np.flatnonzero(same.sum(axis=(0, 1)) < 2)
+    normal, over = face_normals(*corners), []
+    for plane, edges, shared in ((one, other, same.any(axis=0)), (other, one, same.any(axis=1))):
+        height = _heights(normal, corners, plane.take(pair), edges.take(pair), shared[:, pair])
+        cut = (height.min(axis=0) < 0) & (height.max(axis=0) > 0)
+        pair, over = pair[cut], [each[:, cut] for each in (*over, height)]
+    one, other = one.take(pair), other.take(pair)
     hit = np.zeros(len(one), bool)
     for plane, edges, height in ((one, other, over[0]), (other, one, over[1])):
         for k in range(3):
@@ -93,10 +93,11 @@ def crossing_faces(mesh: Mesh, asked: np.ndarray) -> np.ndarray:
     return np.stack([one[hit], other[hit]])
 
 
-def _heights(normal, off, shared):
-    """How far corners, `off` (3,3,p) from planes with `normal` (3,p), lie over these, (3,p), times the normal's length;
-    0 for those `shared`, (3,p) bool."""
-    return np.where(shared, 0.0, [dots(normal, corner) for corner in off])
+def _heights(normal, corners, plane, edges, shared):
+    """How far the corners of faces `edges` (p,) lie over the planes of faces `plane` (p,), (3,p), times the length of
+    the normal; 0 for those `shared`, (3,p) bool."""
+    start, way = corners[0].take(plane, axis=1), normal.take(plane, axis=1)
+    return np.where(shared, 0.0, [dots(way, corner.take(edges, axis=1) - start) for corner in corners])
 
 
 def _close(corners, asked):
