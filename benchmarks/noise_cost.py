@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from core import Settings, reconstruct
-from core.budget import estimate_cost
+from core.budget import crowded_share, estimate_cost
 from core.cleaning.noise import looks_noisy
 from core.field.grid import fit_grid
 from core.memory import peak_memory_mb
@@ -33,7 +33,8 @@ def _cost(path, sampling, settings):
     points = load_case(path, sampling).points
     samples = prepare_samples(points)
     spacing, grid = local_spacing(samples.points), fit_grid(samples.points, settings.resolution)
-    said = estimate_cost(spacing, grid, settings, looks_noisy(samples.points, spacing))
+    looks = looks_noisy(samples.points, spacing), crowded_share(samples.points, spacing)
+    said = estimate_cost(spacing, grid, settings, *looks)
     before = peak_memory_mb()
     with Clock() as clock:
         reconstruct(points, settings)

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
+from .cleaning.anchors import some_samples
 from .errors import MemoryBudgetError
 from .field.grid import Grid, fit_grid
 from .linalg import row_dots
+from .neighbourhoods.quadrics import nested_residuals
 from .parallel import cores
 from .points import MINIMUM_SAMPLES
 from .settings import BESIDE_OFFSET, Settings, options
@@ -36,6 +38,9 @@ _FIXED, _SAMPLE, _NOISY_SAMPLE = 0.37, 1.3e-4, 1.5e-4
 _NEAR_NODE, _NODE, _BAND_NEAR_NODE = 4.3e-6, 6.3e-8, 1.26e-5
 _MESHES = 3.7e-5  # for a squared cell of the surface
 _BAND_NEAR = 3.7, 1 / 8  # cells from the surface in a band, where all nodes are projected, and the share of others
+_CROWDED = {"none": 0.0, "double": 1.5, "single": 2.5, "both": 2.5, "signed": 2.5}  # times the work, by that share
+_LOOKED_AT, _NEIGHBOURS = 500, 24  # samples, and those nearest to each
+_OFF = 0.25  # local spacings, that these are off the quadric through them where sheets run close
 _PROBE = 0.0045
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
 _NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
@@ -51,9 +56,13 @@ class Estimate:
     cpu_seconds: float
 
 
-def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False) -> Estimate:
+def estimate_cost(
+    spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False, crowded: float = 0.0
+) -> Estimate:
     """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
-    settings the resolution, the band, whether there is a surface and, for the memory, solver and integration count.
+    settings the resolution, the band, the surface and, for the memory, solver and integration count.
+
+    crowded : share of the samples where sheets run close, see :func:`crowded_share`
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
     """
@@ -67,9 +76,19 @@ def estimate_cost(spacing: np.ndarray, grid: Grid, settings: Settings = Settings
         width, share = _BAND_NEAR
         near = min(nodes, 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells)))))
         work += _BAND_NEAR_NODE * near
+    work *= 1 + _CROWDED[settings.surface] * crowded * (not noisy)
     probe, busy = _probe()
     cpu = work * probe / _PROBE
     return Estimate(_CORES * busy * cpu, _memory(len(spacing), area, nodes, settings), cpu)
+
+
+def crowded_share(points: np.ndarray, spacing: np.ndarray) -> float:
+    """Share of samples (n,3) with local spacing (n,), in the same units, whose neighbours lie off any one quadric, as
+    those of sheets that run close do: such sheets are told apart in several ways, which takes time. Of 500 samples, or
+    all. Noise looks like that, too."""
+    rows = some_samples(points, min(_LOOKED_AT, len(points)), 0)
+    (found,) = nested_residuals(points, rows, (min(_NEIGHBOURS, len(points)),))
+    return float((found.level > _OFF * spacing[rows]).mean())
 
 
 def suited_resolution(points: np.ndarray, spacing: np.ndarray) -> int:

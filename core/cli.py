@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from tqdm import tqdm
 
-from .budget import SUITED, estimate_cost, suited_resolution
+from .budget import SUITED, crowded_share, estimate_cost, suited_resolution
 from .cleaning.clean import clean
 from .cleaning.noise import looks_noisy
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
@@ -320,7 +320,7 @@ def _info(given):
     low, high = used.min(axis=0), used.max(axis=0)
     grid = fit_grid(used, settings.resolution)
     spacing = local_spacing(samples.points)
-    noisy = looks_noisy(samples.points, spacing)
+    noisy, crowded = looks_noisy(samples.points, spacing), crowded_share(samples.points, spacing)
     spacing *= samples.scale
     facts = {
         "scan": given.scan,
@@ -337,7 +337,8 @@ def _info(given):
         "band": settings.band,
         "grid": {"shape": grid.shape, "cell": grid.spacing},
         "noisy": noisy,
-        "estimate": asdict(estimate_cost(spacing, grid, settings, noisy)),
+        "crowded": crowded,
+        "estimate": asdict(estimate_cost(spacing, grid, settings, noisy, crowded)),
     }
     print(report_json(facts) if given.json else _described(facts))
 

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from .budget import check_budget, estimate_cost
+from .budget import check_budget, crowded_share, estimate_cost
 from .cleaning.clean import clean
 from .errors import SettingsError
 from .field.distance_field import BandedField, DistanceField
@@ -79,7 +79,8 @@ def _reconstruct(points, settings, constraints, normals, progress):
         rounded = rounding_warning(unmoved, typical)
         del unmoved
         grid = fit_grid(samples.points, settings.resolution)
-        estimate = estimate_cost(spacing, grid, settings, noisy="noisy" in cleaning)
+        crowded = crowded_share(samples.points, spacing)
+        estimate = estimate_cost(spacing, grid, settings, "noisy" in cleaning, crowded)
         large = check_budget(estimate, spacing, grid, settings)
 
     with _timed(seconds, "normals"):

@@ -16,17 +16,19 @@ from .properties import chosen, settings_from
 
 @dataclass(frozen=True)
 class Points:
-    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, in scene units, and
-    whether the samples look noisy."""
+    """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, in scene units, whether
+    the samples look noisy, and the share of them where sheets run close."""
 
     corners: np.ndarray
     spacing: np.ndarray
     noisy: bool
+    crowded: float
 
     @classmethod
     def of(cls, found: Outcome) -> "Points":
         """What was found where :data:`COST` was asked for."""
-        return cls(np.stack([found.points.min(axis=0), found.points.max(axis=0)]), found.spacing, found.noisy)
+        corners = np.stack([found.points.min(axis=0), found.points.max(axis=0)])
+        return cls(corners, found.spacing, found.noisy, found.crowded)
 
     def suits(self) -> int:
         """The resolution at which the points are a cell and a half apart."""
@@ -35,7 +37,8 @@ class Points:
     def cost(self, settings: Settings) -> list[str]:
         """Lines on these points and on the time and memory that `settings` would take."""
         noisy = self.noisy if settings.denoise == "auto" else settings.denoise > 0
-        estimate = estimate_cost(self.spacing, fit_grid(self.corners, settings.resolution), settings, noisy)
+        grid = fit_grid(self.corners, settings.resolution)
+        estimate = estimate_cost(self.spacing, grid, settings, noisy, self.crowded)
         return [
             f"{len(self.spacing):,} points, {np.median(self.spacing):.3g} apart",
             f"Suits: resolution {self.suits()}",

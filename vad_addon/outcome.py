@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import pipeline
+from ..core.budget import crowded_share
 from ..core.cleaning.clean import clean
 from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
@@ -113,6 +114,7 @@ class Outcome:
     seconds  : duration of the reconstruction
     spacing  : (n',) float64, local spacing of the points, if asked for COST
     noisy    : whether they look noisy, if asked for that
+    crowded  : share of them where sheets run close, if asked for that, see :func:`crowded_share`
     """
 
     points: np.ndarray
@@ -130,6 +132,7 @@ class Outcome:
     seconds: float
     spacing: np.ndarray | None = None
     noisy: bool | None = None
+    crowded: float | None = None
 
     def save(self, path: Path) -> None:
         names = "points", "source_index", "normals", "confidence", "origin", "spacing"
@@ -137,7 +140,8 @@ class Outcome:
         for skin in _SKINS:
             if (found := getattr(self, skin)) is not None:
                 arrays |= {f"{skin}.{name}": array for name, array in vars(found).items()}
-        facts = {name: getattr(self, name) for name in ("cell", "shape", "report", "warnings", "seconds", "noisy")}
+        names = "cell", "shape", "report", "warnings", "seconds", "noisy", "crowded"
+        facts = {name: getattr(self, name) for name in names}
         facts["volume"] = self.volume and str(self.volume)
         np.savez(path, **arrays, facts=json.dumps(facts))
 
@@ -186,7 +190,8 @@ def _begun(task, progress):
     row = samples.given_order()
     normals, confidence, ignored = None, None, ()
     if task.until == COST:
-        measured = {"spacing": spacing[row] * samples.scale, "noisy": bool(looks_noisy(samples.points, spacing))}
+        noisy, crowded = (of(samples.points, spacing) for of in (looks_noisy, crowded_share))
+        measured = {"spacing": spacing[row] * samples.scale, "noisy": bool(noisy), "crowded": crowded}
     if task.until == NORMALS:
         constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
         part = progress.part(share, 1.0, "normals")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core import Settings, VADError, reconstruct
-from core.budget import Estimate, _probe, check_budget, estimate_cost, free_memory_mb, suited_resolution
+from core.budget import Estimate, _probe, check_budget, crowded_share, estimate_cost, free_memory_mb, suited_resolution
 from core.cleaning.noise import looks_noisy
 from core.cli import main
 from core.errors import MemoryBudgetError
@@ -108,6 +108,24 @@ def test_noise_costs(monkeypatch):
     moved = points + np.random.default_rng(0).normal(size=points.shape) * 0.03
     assert not looks_noisy(points, spacing)
     assert looks_noisy(moved, local_spacing(moved))
+
+
+def test_sheets_that_run_close_cost(monkeypatch):
+    """Concentric spheres a spacing apart; around a single one of as many points no two sheets are seen."""
+    monkeypatch.setattr("core.budget._probe", lambda: (0.004, 1.0))
+    points = shapes.scattered_sphere(3000)
+    spacing = local_spacing(points)
+    shells = np.concatenate([points, (1 + np.median(spacing)) * shapes.scattered_sphere(3000, seed=1)])
+    alone, crowded = crowded_share(points, spacing), crowded_share(shells, local_spacing(shells))
+    assert alone < 0.02
+    assert crowded > 0.5
+    grid = fit_grid(points, 64)
+
+    def work(share, surface):
+        return estimate_cost(spacing, grid, Settings(surface=surface), crowded=share).cpu_seconds
+
+    assert work(crowded, "single") > work(crowded, "double") > 1.5 * work(alone, "double")
+    assert work(crowded, "none") == work(0, "none")
 
 
 def test_a_run_beyond_half_of_the_limit_warns():
