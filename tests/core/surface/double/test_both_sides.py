@@ -12,9 +12,10 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from core import Mesh, Settings, both_sides, reconstruct
-from core.linalg import tangent_frames
+from core.linalg import lengths, tangent_frames
 from core.surface import choice
 from core.surface.double.layers import HAIR
+from core.surface.edges import meetings
 from core.surface.meshing import misfit
 from core.surface.meshing.misfit import askew, distances
 from core.surface.single import single_layer
@@ -424,11 +425,41 @@ def test_of_torn_ones_the_cover_that_misses_none_of_the_surface_is_taken():
     assert len(shapes.components(run.surface)) == 1
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_sides_are_sought_only_of_a_layer_that_is_closer(sign, monkeypatch):
+    """Of a torn one, orders of faces around its many lines take longer than all the rest."""
+    sought = []
+    monkeypatch.setattr(choice, "both_sides", lambda *given: sought.append(given) or both_sides(*given))
+    monkeypatch.setattr(choice, "chamfer", lambda *given: sign * misfit.chamfer(*given))
+    reconstruct(scattered_twigs(2000, 20, 0.05), Settings(resolution=48, surface="single"))
+    assert len(sought) == (sign > 0)
+
+
 def test_shreds_are_told():
     run = reconstruct(scattered_twigs(3000, 30, 0.05), Settings(resolution=64, surface="single"))
     assert any("single layer is torn" in warning for warning in run.report["warnings"])
     whole = reconstruct(scattered_twigs(3000, 20, 0.02), Settings(resolution=64, surface="single"))
     assert whole.report["warnings"] == []
+
+
+def finned_ball(count):
+    """Samples of a ball of radius .5 with two fins .09 thick that stick out of it by .35."""
+    fin = shapes.scattered_box(count // 2, [1.7, 0.09, 0.4]) - [0.85, 0.045, 0.2]
+    ball = 0.5 * shapes.scattered_sphere(count)
+    ball = ball[(np.abs(ball[:, 1]) > 0.045) | (np.abs(ball[:, 2]) > 0.2)]
+    return np.concatenate([ball, fin[lengths(fin.T) > 0.5]]) @ shapes.random_rotation(1).T
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_thick_shape_with_thin_fins_needs_no_cover_extracted(share, monkeypatch):
+    """Were all its meetings of close sheets, as in a thin wall, one would be looked at."""
+    made, extract = [], choice.double_cover
+    monkeypatch.setattr(choice, "double_cover", lambda *given: made.append(given) or extract(*given))
+    monkeypatch.setattr(meetings, "_MOSTLY", 0.5 - share)
+    run = reconstruct(finned_ball(4000), Settings(resolution=48, surface="both", denoise=0))
+    assert bool(made) == bool(share)
+    assert shapes.euler(run.sheet) == 2
+    assert set(run.sheet.edge_counts()[1]) == {2}
 
 
 @pytest.mark.parametrize("pages", [[0, 25, 50, 180], [0, 10, 180, 190]])

@@ -77,3 +77,12 @@ def test_no_other_layer_is_made_where_room_tells_no_more_sheets(tells, layers, m
     monkeypatch.setattr(single_layer, "find_meetings", lambda *given: meet(*given[:2], by_room=given[2] and tells))
     single(glued_roll())
     assert len(made) == layers
+
+
+@pytest.mark.parametrize(("few", "times"), [(0.0, 2), (1.0, 1)])
+def test_meetings_are_not_looked_for_again_where_few_samples_have_little_room(few, times, monkeypatch):
+    asked, meet = [], single_layer.find_meetings
+    monkeypatch.setattr(single_layer, "find_meetings", lambda *given: asked.append(given) or meet(*given))
+    monkeypatch.setattr(single_layer, "FEW", few)
+    single(glued_roll())
+    assert len(asked) == times
