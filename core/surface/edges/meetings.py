@@ -35,7 +35,7 @@ _WEAK, _NEXT = 0.15, 8  # that share where samples connect to such ones, by so m
 FEW = 0.005  # of all samples, at meetings, beside others, or that show no line: as few may be chance
 _THROUGH = 0.125  # of the samples at meetings: as many on sheets that pass through one another are no chance
 _BESIDE = 0.05  # of the samples at meetings: more beside another sheet tear single layers
-_MOSTLY = 0.5  # of them: of thick shapes at most .47, where most walls or slits are thin .59 and more
+_MUCH = 1 / 3  # of them: of thick shapes mostly .31 and less, where walls or slits are thin .36 and more
 _LINE, _AROUND, _DENSE = 24, 12, 0.33  # samples that show a line, at least; around each; share of all around, at least
 _PASSING = 24  # samples around one, with such a sample among which it is close to the line
 
@@ -72,10 +72,10 @@ class Meetings:
         return not self.few and bool(self._share(self.beside) > _BESIDE)
 
     @property
-    def mostly_side_by_side(self) -> bool:
-        """Whether most meetings are of sheets that run so close, as in thin walls and slits; creases and tight bends
-        of thick shapes may look like some."""
-        return self.side_by_side and bool(self._share(self.beside) > _MOSTLY)
+    def much_side_by_side(self) -> bool:
+        """Whether a third of the meetings and more are of sheets that run so close, as where walls or slits are thin;
+        creases and tight bends of thick shapes may look like some."""
+        return self.side_by_side and bool(self._share(self.beside) > _MUCH)
 
     def adds_to(self, others: "Meetings") -> bool:
         """Whether more samples are at these meetings than at others, and not so few that they may be chance."""

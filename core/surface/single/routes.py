@@ -98,14 +98,14 @@ def boundary_of_inside(
     """The boundary of the inside of a closed surface, see :func:`signed_mesh`: closed and wound outwards.
 
     It has holes in walls so thin that hardly a node lies inside. A double cover extracted at an offset does not: around
-    a thin wall it has one layer in place of two. So where sheets run side by side at most meetings its outer side is
+    a thin wall it has one layer in place of two. So where many meetings are of sheets side by side its outer side is
     taken if that is closed, too, and closer to the surface, as it is where all walls are thin; thick ones beside thin
     slits it misses.
 
     signed : (nx,ny,nz) float32 or Blocks, distances, negative inside     cover : function that gives the double cover
     """
     mesh = signed_mesh(signed, sides.wedges, meetings.passing, surface, grid, progress)
-    if not meetings.mostly_side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
+    if not meetings.much_side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
         return mesh
     outer = untangled(mended(one_side(cover(), signed, surface, grid), surface, grid.spacing), surface)
     closed = (outer.edge_counts()[1] == 2).all()

@@ -129,8 +129,8 @@ class SingleLayer:
     @property
     def is_rough(self) -> bool:
         """Whether sheets run side by side, and it goes to and fro between them, or is torn where it bounds an inside
-        and most of its meetings are not of such sheets."""
-        parted = self.sides.complete and not self.meetings.mostly_side_by_side
+        and few of its meetings are of such sheets."""
+        parted = self.sides.complete and not self.meetings.much_side_by_side
         return self.meetings.side_by_side and self.misfit[0] > (1 if parted else ROUGH)
 
     def told_apart(self) -> "SingleLayer":
