@@ -58,7 +58,7 @@ class Choice:
 
     @property
     def is_cover_better(self) -> bool:
-        """Whether the single layer is torn, and the double cover neither is nor has its sides."""
+        """Whether the single layer is torn, and the double cover is not, nor made of its sides."""
         worst = self.best_single[2][0]
         return worst > 1 and not self.is_of_sheet and self.extracted_fit[0] < BETTER * worst
 
