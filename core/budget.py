@@ -63,7 +63,7 @@ def estimate_cost(
     """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
     settings the resolution, the band, the surface and, for the memory, solver and integration count.
 
-    crowded : share of the samples where sheets run close, see :func:`crowded_share`
+    crowded : share of the samples where sheets run close, see :func:`crowded_share`; counts for clean ones alone
 
     The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
     """

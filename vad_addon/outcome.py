@@ -140,8 +140,8 @@ class Outcome:
         for skin in _SKINS:
             if (found := getattr(self, skin)) is not None:
                 arrays |= {f"{skin}.{name}": array for name, array in vars(found).items()}
-        names = "cell", "shape", "report", "warnings", "seconds", "noisy", "crowded"
-        facts = {name: getattr(self, name) for name in names}
+        told = "cell", "shape", "report", "warnings", "seconds", "noisy", "crowded"
+        facts = {name: getattr(self, name) for name in told}
         facts["volume"] = self.volume and str(self.volume)
         np.savez(path, **arrays, facts=json.dumps(facts))
 

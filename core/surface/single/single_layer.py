@@ -139,8 +139,8 @@ class SingleLayer:
         - its misfit is less than half of this one's; or
         - it is less at all, it shows more of the samples, and both are torn (of a misfit above 1) or neither is.
 
-        It never takes the place of what lies between two sides. That has no lines of more than two faces, and it may
-        have some along creases."""
+        It is not looked for where so few samples have little room that these may be chance, and never takes the place
+        of what lies between two sides. That has no lines of more than two faces, and it may have some along creases."""
         if not self.is_rough or self.between is not None or np.isfinite(self.local.room).mean() <= FEW:
             return self
         other = replace(self, by_room=True, progress=self.progress.part(0.7, 0.95))

@@ -455,7 +455,7 @@ def test_a_thick_shape_with_thin_fins_needs_no_cover_extracted(share, monkeypatc
     """Were all its meetings of close sheets, as in a thin wall, one would be looked at."""
     made, extract = [], choice.double_cover
     monkeypatch.setattr(choice, "double_cover", lambda *given: made.append(given) or extract(*given))
-    monkeypatch.setattr(meetings, "_MUCH", 1 / 3 - share)
+    monkeypatch.setattr(meetings, "_MUCH", meetings._MUCH - share)
     run = reconstruct(finned_ball(4000), Settings(resolution=48, surface="both", denoise=0))
     assert bool(made) == bool(share)
     assert shapes.euler(run.sheet) == 2
