@@ -182,6 +182,14 @@ def conjugate_gradients(
     return u
 
 
+def medians(rows: np.ndarray) -> np.ndarray:
+    """The median of what is not nan in each row (m,k), (m,) float64, nan where all is. NumPy's takes ten times as long,
+    by masked arrays."""
+    ascending, count = np.sort(rows, axis=1), (~np.isnan(rows)).sum(axis=1)
+    middle = np.stack([np.maximum(count - 1, 0) // 2, count // 2], axis=1).clip(max=rows.shape[1] - 1)
+    return np.take_along_axis(ascending, middle, axis=1).mean(axis=1)
+
+
 def inner(a: np.ndarray, b: np.ndarray) -> float:
     """Sum of the products of two arrays of one shape."""
     return float((a * b).sum())

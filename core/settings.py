@@ -143,7 +143,8 @@ class Settings:
     outliers: bool = _option(
         True,
         "Drop stray points far from any surface, the few that lie further from all others than these from each other, "
-        "and those inside a solid that points fill, before anything else; how many is in the report",
+        "those inside a solid that points fill, and most of lines whose points lie much closer than cells and the next "
+        "line, before anything else; what is dropped is said",
     )
     denoise: float | str = _option(
         "auto",

@@ -1,10 +1,12 @@
-"""Stray samples dropped, noisy ones moved: what the rest of the method then takes for the surface's own."""
+"""Stray samples dropped, dense lines thinned, noisy samples moved: what the method then takes for the surface's own."""
 
 import numpy as np
 
+from ..field.grid import fit_grid
 from ..points import Samples, local_spacing
 from ..progress import Progress
 from ..settings import Settings
+from .dense_lines import thinned_lines
 from .depth_steps import between_steps
 from .filled import bounds_volume, fills_volume
 from .outliers import find_outliers
@@ -16,8 +18,8 @@ _FAR = 2.0  # sides of the box around all over that around those kept, from whic
 
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
-    """Samples without strays, noise, steps of depth and insides of solids, and what was done about them, in input
-    units, for the report.
+    """Samples without strays, noise, steps of depth and insides of solids, with dense lines thinned; and what was done
+    about strays, noise and steps, in input units, for the report.
 
     Clean samples come back as they are, bit for bit.
     """
@@ -30,8 +32,22 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
         dropped = np.zeros(len(samples.points), bool)
     if dropped.any():
         samples = samples.without(dropped, _said_of_dropped(dropped, samples.points))
-    samples, done = _off_noise(samples, settings, progress.part(0.3, 1.0))
+    if settings.outliers:
+        samples = _with_lines_thinned(samples, settings.resolution, progress.part(0.3, 0.4))
+    samples, done = _off_noise(samples, settings, progress.part(0.4, 1.0))
     return samples, {"outliers": int(dropped.sum()), **stepped, **done}
+
+
+def _with_lines_thinned(samples, resolution, progress):
+    """The samples, and of those on dense lines fewer."""
+    left = thinned_lines(samples.points, fit_grid(samples.points, resolution).spacing, progress)
+    if left.all():
+        return samples
+    said = (
+        f"{(~left).sum()} of {len(left)} points dropped from lines, where they lie much closer than the next line and "
+        "than a cell; with outliers=False they stay"
+    )
+    return samples.without(~left, said)
 
 
 def _said_of_dropped(dropped, points):

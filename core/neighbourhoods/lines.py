@@ -6,9 +6,11 @@ Their local spacing is that along the line, and the next line may be many times 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ..linalg import outer, principal_axes, row_dots
 from ..parts import connected_parts
+from ..trees import k_nearest
 
 _NEAREST = 4  # of a sample, that tell whether it is on a line
 _SLENDER = 0.0625  # their second moment across the line, of that along it, at most
@@ -16,6 +18,7 @@ _MANY, _AROUND = 0.65, 6  # of as many nearest, at least, that are on lines as w
 _FEW = 8  # samples, that a line has at least
 _NEXT = 1.2  # local spacings, to the next samples of the same line
 _ASIDE = 0.5  # sine, at least, of the angle between a line and the way to another one
+OTHERS = 64  # samples among which another line is looked for
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,15 @@ class Lines:
     def aside(self, own: np.ndarray, steps: np.ndarray) -> np.ndarray:
         """Whether steps (m,k,3) from samples `own` (m,), on lines, lead to the side of these, (m,k) bool."""
         return row_dots(steps, self.along[own, None]) ** 2 < (1 - _ASIDE**2) * row_dots(steps, steps)
+
+    def to_others(self, points: np.ndarray, own: np.ndarray, tree: KDTree) -> np.ndarray:
+        """How far from samples `own` (m,), on lines, another line is, or where there is none around, their own to the
+        side, (m,); 0 where that is not either. All samples are the `points` (n,3) of the tree."""
+        distance, other = k_nearest(tree, points[own], OTHERS, workers=-1)
+        aside = self.aside(own, points[other] - points[own, None])
+        others = aside & (self.number[other] != self.number[own, None])
+        chosen = np.where(others.any(axis=1)[:, None], others, aside)
+        return np.where(chosen.any(axis=1), distance[np.arange(len(own)), chosen.argmax(axis=1)], 0.0)
 
 
 def find_lines(points: np.ndarray, spacing: np.ndarray, nearest: np.ndarray) -> Lines:

@@ -4,12 +4,11 @@ would tell then how axes are turned about the line that they are on."""
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..neighbourhoods.lines import find_lines
+from ..neighbourhoods.lines import OTHERS, find_lines
 from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
 from .facets import REACH
 
-_AROUND = 64  # samples among which another line is looked for
 _BEYOND = 1.3  # times its distance, up to where facets reach
 _CHUNK = 16384  # samples
 
@@ -22,7 +21,7 @@ def spacing_across_lines(points: np.ndarray, spacing: np.ndarray, progress=None)
     On a wavy sheet of parallel lines five local spacings apart, mean |n.n_true| was .25, now 1.0.
     """
     n = len(points)
-    if n <= _AROUND:
+    if n <= OTHERS:
         return spacing
     tree, nearest = KDTree(points), np.empty((n, SPACING_NEIGHBOURS), np.int64)
     for part in Progress.of(progress).chunks(n, _CHUNK):
@@ -31,14 +30,5 @@ def spacing_across_lines(points: np.ndarray, spacing: np.ndarray, progress=None)
     own = np.flatnonzero(lines.number >= 0)
     for first in range(0, len(own), _CHUNK):
         part = own[first : first + _CHUNK]
-        found[part] = np.maximum(spacing[part], _BEYOND / REACH * _to_other_lines(points, part, lines, tree))
+        found[part] = np.maximum(spacing[part], _BEYOND / REACH * lines.to_others(points, part, tree))
     return found
-
-
-def _to_other_lines(points, own, lines, tree):
-    """How far from some samples on lines another line is, (m,); 0 where none is around."""
-    distance, other = tree.query(points[own], k=_AROUND, workers=-1)
-    aside = lines.aside(own, points[other] - points[own, None])
-    others = aside & (lines.number[other] != lines.number[own, None])
-    chosen = np.where(others.any(axis=1)[:, None], others, aside)
-    return np.where(chosen.any(axis=1), distance[np.arange(len(own)), chosen.argmax(axis=1)], 0.0)

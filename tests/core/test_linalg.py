@@ -11,6 +11,7 @@ from core.linalg import (
     eigenvalues,
     inner,
     laplacian_symbol,
+    medians,
     outer,
     principal_axes,
     shortened,
@@ -148,6 +149,16 @@ def solved(matrix, right, tolerance, steps, start=None):
     diagonal = np.diag(matrix).reshape(right.shape)
     apply = lambda u: (matrix @ u.ravel()).reshape(u.shape)  # noqa: E731
     return conjugate_gradients(apply, right, start, lambda residual: residual / diagonal, tolerance, steps)
+
+
+def test_medians_leave_out_what_is_not_there(random):
+    rows = random.normal(size=(200, 9))
+    rows[random.random(rows.shape) < 0.5] = np.nan
+    rows[0], rows[1, 1:], rows[2] = np.nan, np.nan, np.arange(9.0)
+    found = medians(rows)
+    assert np.isnan(found[0])
+    np.testing.assert_array_equal(found[1:], np.nanmedian(rows[1:], axis=1))
+    assert medians(np.empty((0, 4))).shape == (0,)
 
 
 def test_conjugate_gradients_solve_until_the_residual_is_small(random):

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...linalg import medians
 from ...neighbourhoods.cloud import Cloud
 from ...parallel import in_order
 from ...progress import Progress
@@ -48,11 +49,13 @@ def with_line_gaps_bridged(rims: Rims, cloud: Cloud, bridge: float, progress=Non
     around = np.concatenate([around[at], _around(other[own, side], cloud)], axis=1)
     of_looking, of_thin = np.nanmean(shares[:, around], axis=2)
     lines = (of_looking >= _LOOKING) & (of_thin >= _THIN)
-    lines &= width[own, side] <= _EVEN * np.nanmedian(width[around], axis=(1, 2))
+    own, side, around = own[lines], side[lines], around[lines]
+    even = width[own, side] <= _EVEN * medians(width[around].reshape(len(own), 2 * around.shape[1]))
+    own, side = own[even], side[even]
 
     bridged, reach = rims.bridged.copy(), np.stack([rims.reach, rims.behind], axis=1)
-    lines &= (side == 1) | ~bridged[own]
-    own, side = own[lines], side[lines]
+    first = (side == 1) | ~bridged[own]
+    own, side = own[first], side[first]
     reach[own, side] = bridged_reach(width[own, side], spacing[own])
     bridged[own[side == 0]] = True
     return replace(rims, bridged=bridged, reach=reach[:, 0], behind=reach[:, 1])
