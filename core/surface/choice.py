@@ -26,6 +26,7 @@ SPARSEST = 5.0  # cells, median local spacing up to which single layers have the
 _CLOSE = 1e-3  # grid edges across ridges, for each node of the band: with fewer sheets run nowhere close
 _SEEN = 0.7  # of the vertices on lines where a single layer has more than two faces, at least, at meetings
 _CLEAN = 0.9975  # mean confidence of samples whose sheets pass through others, at least; noise of .05 cells leaves less
+_MISSED = 0.1  # of the samples, that the single layer misses and a double cover in its place does not
 _SPLIT = 0.3  # of the vertices on borders of one without such lines, at most: it has parted sheets that meet
 
 
@@ -58,9 +59,13 @@ class Choice:
 
     @property
     def is_cover_better(self) -> bool:
-        """Whether the single layer is torn, and the double cover is not, nor made of its sides."""
-        worst = self.best_single[2][0]
-        return worst > 1 and not self.is_of_sheet and self.extracted_fit[0] < BETTER * worst
+        """Whether the single layer is torn or misses many samples, and the double cover does not, nor is made of its
+        sides."""
+        worst, missed = self.best_single[2]
+        if (worst <= 1 and missed <= _MISSED) or self.is_of_sheet:
+            return False
+        covers_worst, covers_missed = self.extracted_fit
+        return (worst > 1 and covers_worst < BETTER * worst) or missed - covers_missed > _MISSED
 
     @cached_property
     def cover(self) -> Mesh:

@@ -426,6 +426,18 @@ def test_a_single_layer_that_samples_are_near_but_that_runs_to_and_fro_is_torn(n
     assert misfit.askew(run.sheet, KDTree(run.points), run.normals) < 0.1
 
 
+def test_a_single_layer_that_misses_many_samples_is_torn():
+    """Of a blade, less than a cell thick and with points in rows around it, there was a strip a row."""
+    turn, rows = np.linspace(0, 2 * np.pi, 120, endpoint=False), np.linspace(-0.4, 0.4, 67)
+    rise = np.sign(np.sin(turn)) * np.sqrt(np.abs(np.sin(turn)))
+    around = np.column_stack([0.035 * np.cos(turn), 0.003 * rise])
+    points = np.column_stack([np.repeat(rows, 120), np.tile(around, (67, 1))])
+    run = reconstruct(points, Settings(surface="both"))
+    np.testing.assert_array_equal(run.sheet.vertices, run.surface.vertices)
+    assert len(shapes.components(run.sheet)) == 1
+    assert any("the double cover is in its place" in warning for warning in run.report["warnings"])
+
+
 def test_where_points_are_too_few_for_a_single_layer_no_finer_grid_is_advised():
     corners = np.indices((2, 2, 2)).reshape(3, 8).T
     (warning,) = reconstruct(corners, Settings(resolution=32, surface="single")).report["warnings"]
