@@ -8,6 +8,7 @@ from ...linalg import dots, symmetric, unit_columns
 from ...parts import connected_parts
 from ..mesh import Mesh, at_corners, face_normals
 from ..signs.spreading import spread_signs, spread_strongest
+from .facing import facing_one_side
 
 _SMOOTH = 0.7  # least cosine between the normals of two faces across whose edge a surface is smooth
 _LEAST = 1.01  # what makes cosines strengths
@@ -21,6 +22,7 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     patch that cannot be oriented lie along bends, or where a line of three faces has a gap; else along one line, a
     Moebius band's for instance, and around quads.
     A patch is turned so that its area-weighted normals point away from the mesh's centre; a closed one points outwards.
+    Others are turned together where they can all face one side, see :func:`facing_one_side`.
     """
     n = len(mesh.faces)
     if not n:
@@ -29,10 +31,15 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     corners = at_corners(mesh.vertices - mesh.vertices.mean(axis=0), mesh.faces)
     normal = face_normals(*corners)
     sign, patch = _spread(np.where(against, -1.0, 1.0), pair, normal, _beside_lines(mesh))
-    turned = sign < 0
-    outwards = dots(normal, corners[0])
-    inwards = np.bincount(patch, np.where(turned, -outwards, outwards)) < 0
-    turned ^= inwards[patch]
+    inwards = np.bincount(patch, sign * dots(normal, corners[0])) < 0
+    opened = np.bincount(patch, (mesh.edges.count != 2)[mesh.edges.number].any(axis=1)) > 0
+    some = np.flatnonzero(opened[patch])
+    middle = np.mean([corner[:, some] for corner in corners], axis=0)
+    facing = facing_one_side(sign[some] * normal[:, some], middle, patch[some])
+    if facing is not None:
+        open_patch = np.unique(patch[some])
+        inwards[open_patch] = facing[open_patch] < 0
+    turned = (sign < 0) ^ inwards[patch]
     halves = np.arange(2 * mesh.pairs).reshape(2, -1)
     whole = patch[halves[0]] == patch[halves[1]]
     turned[halves[1, whole]] = turned[halves[0, whole]]

@@ -99,6 +99,48 @@ def test_patches_are_turned_one_by_one():
     assert abs(shapes.signed_volume(Mesh(vertices, mesh.faces[:4]))) == pytest.approx(1 / 6)
 
 
+def scene():
+    """Uneven ground, and a roof above a gap in it, as seen from above."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41), indexing="ij")
+    number = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1).reshape(-1, 4)
+    middle = np.column_stack([x.reshape(-1), y.reshape(-1)])[quads].mean(axis=1)
+    roof = np.abs(middle).max(axis=1) < 0.3
+    near = np.abs(np.abs(middle).max(axis=1) - 0.35) < 0.051
+    ground = np.column_stack([x.reshape(-1), y.reshape(-1), 0.02 * np.sin(9 * x.reshape(-1))])
+    above = ground + np.array([0, 0, 0.5])
+    quads = np.concatenate([quads[~roof & ~near], quads[roof] + len(ground)])
+    faces = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]).astype(np.int32)
+    return Mesh(np.concatenate([ground, above]), faces)
+
+
+def normals(mesh):
+    a, b, c = (mesh.vertices[corner] for corner in mesh.faces.T)
+    return np.cross(b - a, c - a)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_seen_from_one_side_faces_it_together(seed):
+    """By itself the ground would face down, away from the roof."""
+    mesh, failures = orient(shuffled(scene(), seed))
+    assert failures == 0
+    assert (normals(mesh)[:, 2] > 0).all()
+    turned = shapes.random_rotation(seed)
+    mesh, _ = orient(shuffled(Mesh(scene().vertices @ turned.T, scene().faces), seed))
+    facing = np.sign(normals(mesh) @ turned[:, 2])
+    assert (facing == facing[0]).all()
+
+
+def test_what_lies_behind_other_parts_faces_away_from_the_middle():
+    """Two sheets above one another, each a patch."""
+    sheet = scene()
+    vertices = np.concatenate([sheet.vertices, sheet.vertices + np.array([0, 0, 2])])
+    mesh, _ = orient(shuffled(Mesh(vertices, np.concatenate([sheet.faces, sheet.faces + len(sheet.vertices)]))))
+    upper = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > 1
+    assert (normals(mesh)[upper, 2] > 0).all()
+    assert (normals(mesh)[~upper, 2] < 0).all()
+
+
 def test_nothing_to_wind():
     assert orient(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)))[1] == 0
 
@@ -129,10 +171,13 @@ def test_quads_stay_quads_and_their_halves_are_wound_alike(twisted):
 @pytest.mark.parametrize(("middle", "pairs"), [((0, 0.5, -5), 1), ((-3, 0.5, 0.5), 0)])
 def test_a_quad_whose_halves_are_wound_by_themselves_may_end_as_triangles(middle, pairs):
     """A third triangle on its diagonal parts the halves, and each is turned to face away from the middle of all
-    vertices, which is above the one and below the other in the second case."""
-    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 1], [0, 0.5, -1]]
-    vertices = np.concatenate([corners, np.tile(middle, (100, 1))])
-    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 4]], np.int32)
+    vertices, which is above the one and below the other in the second case. A ring around them faces all ways, so
+    they do not face one together."""
+    corners, ring = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 1], [0, 0.5, -1]], band(20, twisted=False)
+    ring.vertices[:] = 5 * ring.vertices / np.hypot(*ring.vertices[:, :2].T)[:, None]
+    ring.vertices[:, 2] = np.repeat([-5, 5], 20)
+    vertices = np.concatenate([corners, ring.vertices, np.tile(middle, (10000, 1))])
+    faces = np.concatenate([[[0, 1, 2], [0, 2, 3], [0, 2, 4]], 5 + ring.faces]).astype(np.int32)
     found, _ = orient(Mesh(vertices, faces, pairs=1))
     assert {frozenset(face) for face in found.faces.tolist()} == {frozenset(face) for face in faces.tolist()}
     assert found.pairs == pairs
