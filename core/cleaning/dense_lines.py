@@ -50,11 +50,11 @@ def _may_be_dense(points, cell):
 def _fewer(points, cell, progress):
     """Which samples are left, (n,) bool, up to 4 times as far apart as they were."""
     n, tree = len(points), KDTree(points)
-    nearest, step, kept = np.empty((n, SPACING_NEIGHBOURS), np.int64), np.empty(n), np.ones(n, bool)
+    nearest, spacing, kept = np.empty((n, SPACING_NEIGHBOURS), np.int64), np.empty(n), np.ones(n, bool)
     for part in progress.part(0.0, 0.5).chunks(n, _CHUNK):
         distance, other = tree.query(points[part], k=SPACING_NEIGHBOURS + 1, workers=-1)
-        nearest[part], step[part] = other[:, 1:], _STEP * distance[:, 1:].mean(axis=1)
-    lines = find_lines(points, step / _STEP, nearest)
+        nearest[part], spacing[part] = other[:, 1:], distance[:, 1:].mean(axis=1)
+    lines, step = find_lines(points, spacing, nearest), _STEP * spacing
     own, apart = np.flatnonzero(lines.number >= 0), np.zeros(n)
     for part in progress.part(0.5, 1.0).chunks(len(own), _CHUNK):
         across = lines.to_others(points, own[part], tree)

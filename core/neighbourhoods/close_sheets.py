@@ -7,7 +7,7 @@ sheet, and the distance of the sheets on another. The two are told apart where a
 
 import numpy as np
 
-from ..linalg import dots
+from ..linalg import dots, medians
 from ..parallel import work_through
 from ..progress import Progress
 from .cloud import Cloud
@@ -35,7 +35,7 @@ def sheet_room(cloud: Cloud, progress=None) -> np.ndarray:
         around = seen[cloud.neighbours[part]]
         two = np.isfinite(around)
         several = two.mean(axis=1) > _SHARE
-        room[part][several] = np.nanmedian(np.where(two, around, np.nan)[several], axis=1)
+        room[part][several] = medians(np.where(two, around, np.nan)[several])
 
     work_through(look, progress.part(0.0, 0.9).chunks(len(cloud), _CHUNK))
     work_through(agree, progress.part(0.9, 1.0).chunks(len(cloud), _CHUNK))

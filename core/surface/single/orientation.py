@@ -33,11 +33,10 @@ def orient(mesh: Mesh) -> tuple[Mesh, int]:
     sign, patch = _spread(np.where(against, -1.0, 1.0), pair, normal, _beside_lines(mesh))
     inwards = np.bincount(patch, sign * dots(normal, corners[0])) < 0
     opened = np.bincount(patch, (mesh.edges.count != 2)[mesh.edges.number].any(axis=1)) > 0
-    some = np.flatnonzero(opened[patch])
+    open_patch, some = np.flatnonzero(opened), np.flatnonzero(opened[patch])
     middle = np.mean([corner[:, some] for corner in corners], axis=0)
     facing = facing_one_side(sign[some] * normal[:, some], middle, patch[some])
     if facing is not None:
-        open_patch = np.unique(patch[some])
         inwards[open_patch] = facing[open_patch] < 0
     turned = (sign < 0) ^ inwards[patch]
     halves = np.arange(2 * mesh.pairs).reshape(2, -1)
