@@ -22,6 +22,11 @@ _LAYOUT = {  # attribute type -> name of the value, width, NumPy type
     "FLOAT4X4": ("value", 16, np.float32),
 }
 _COLOURS = {"FLOAT_COLOR", "BYTE_COLOR"}
+_WIDER = {  # attribute type -> those of which it holds the values
+    "FLOAT_COLOR": _COLOURS,
+    "INT": {"INT", "INT8", "BOOLEAN"},
+    "FLOAT": {"FLOAT", "INT", "INT8", "BOOLEAN"},
+}
 _BLENDERS = {  # names by which it shades, creases, bevels and draws a mesh: there numbers of a scan do harm, or fail
     *("custom_normal", "material_index", "sharp_face", "sharp_edge", "crease_vert", "crease_edge"),
     *("bevel_weight_vert", "bevel_weight_edge", "uv_seam", "freestyle_edge", "freestyle_face"),
@@ -59,7 +64,7 @@ def read(data) -> dict[str, Attribute]:
         for attribute in _own(data)
         if attribute.domain == "POINT" and attribute.data_type in _LAYOUT
     }
-    for attribute in filter(_is_of_corners, _own(data)):
+    for attribute in filter(_is_of_corners, _own(data) if _has_faces(data) else ()):
         found[attribute.name] = Attribute(attribute.data_type, _at_points(data, values(attribute)))
     return found
 
@@ -70,9 +75,9 @@ def left_out(data) -> list[str]:
     return [
         attribute.name
         for attribute in _own(data)
-        if not _is_of_corners(attribute)
+        if not (_is_of_corners(attribute) and _has_faces(data))
         and (attribute.domain, attribute.data_type) != ("CORNER", "FLOAT2")
-        and (attribute.data_type not in _LAYOUT or attribute.domain in {"FACE", "EDGE", "CORNER"})
+        and (attribute.data_type not in _LAYOUT or attribute.domain != "POINT")
         and not (attribute.domain != "POINT" and attribute.name in _BLENDERS)
     ]
 
@@ -84,6 +89,10 @@ def _own(data):
 
 def _is_of_corners(attribute):
     return attribute.domain == "CORNER" and attribute.data_type in _COLOURS
+
+
+def _has_faces(data):
+    return isinstance(data, bpy.types.Mesh) and len(data.loops) > 0
 
 
 def _at_points(mesh, of_corners):
@@ -133,24 +142,32 @@ def of_file(carried: dict[str, np.ndarray]) -> dict[str, Attribute]:
 
 
 def join(parts: list[tuple[int, dict[str, Attribute]]]) -> dict[str, Attribute]:
-    """Attributes of parts laid end to end, each given as (number of points, attributes). Where a part lacks one, or
-    holds it with another type than the first part that has it, its points get zeros."""
-    kinds = {}
-    for _, attributes in parts:
+    """Attributes of parts laid end to end, each given as (number of points, attributes). Where a part lacks one its
+    points get zeros. Colours of two types, or numbers, become ones of the type that holds both; what parts hold with
+    other types of one name is left out."""
+    held = {}
+    for attributes in (found for count, found in parts if count):
         for name, attribute in attributes.items():
-            kinds.setdefault(name, attribute.kind)
+            held.setdefault(name, set()).add(attribute.kind)
+    kinds = {name: kind for name, those in held.items() if (kind := _holding_all(those)) is not None}
 
     def of_part(name, kind, count, attributes):
-        found = attributes.get(name)
-        if found is not None and found.kind == kind:
-            return found.values
         _, width, dtype = _LAYOUT[kind]
+        if count and name in attributes:
+            return attributes[name].values.astype(dtype)
         return np.zeros((count, width) if width > 1 else count, dtype)
 
     return {
         name: Attribute(kind, np.concatenate([of_part(name, kind, *part) for part in parts]))
         for name, kind in kinds.items()
     }
+
+
+def _holding_all(kinds):
+    """The type of attribute that holds what those of some `kinds` do; None where there is none."""
+    if len(kinds) == 1:
+        return next(iter(kinds))
+    return next((wider for wider, others in _WIDER.items() if kinds <= others), None)
 
 
 def values(attribute: bpy.types.Attribute) -> np.ndarray:

@@ -14,6 +14,7 @@ from .attributes import Attribute
 from .outcome import Outcome
 from .points_in import Source, objects_of
 
+_SCULPTED = {".sculpt_face_set", ".sculpt_mask"}  # attributes of Blender's own that the user makes
 OWN = {"normal", "confidence", "distance", "radius"}  # attributes that results set themselves
 
 
@@ -28,7 +29,8 @@ def deliver(
 
     Where just these objects have results from an earlier run, these are updated (those in `collection` where it is
     given), and keep the materials and the modifiers that the user gave them; `keep_both` makes a second collection
-    instead. Meshes that the user changed are kept as objects of their own, hidden, with a warning.
+    instead. Meshes that the user changed are kept as objects of their own, hidden, with a warning, or where an object
+    of the user's shows them.
     The field stays as it is where the outcome is made from its file.
     Objects are placed at the centre of the samples and their data is relative to it, so that single precision is enough
     for large coordinates. Of new results only the mesh is shown. A volume that cannot be written becomes a warning: the
@@ -38,7 +40,7 @@ def deliver(
     warnings = [*source.warnings, *outcome.warnings]
     if collection is None and not keep_both:
         collection = results.previous(scene, objects_of(source))
-    if collection is not None and results.are_edited([*collection.objects, *results.members(collection)]):
+    if collection is not None and results.are_edited(results.all_of(collection)):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
     known = results.member(collection, results.FIELD) if collection is not None else None
@@ -54,8 +56,11 @@ def deliver(
             results.note_sources(collection, objects_of(source))
         rollback.pop_all()
     before, mesh = set(results.members(collection)), results.mesh(collection)
-    for changed in (obj for obj in before if results.MADE in obj and obj[results.MADE] != _digest(obj)):
-        warnings.append(_set_aside(scene, changed))
+    for changed in (obj for obj in before if results.MADE in obj and _is_changed(obj)):
+        if results.is_shown_otherwise(changed):
+            changed.data = changed.data.copy()  # the other stays as it is
+        else:
+            warnings.append(_set_aside(scene, changed))
     _recast(collection, made)
     turned = results.note_turn(collection)
     looked_at = [layer for layer in scene.view_layers if layer.objects.active in before]
@@ -174,14 +179,25 @@ def _place(collection, role, data, origin, turned):
         obj[results.MADE] = _digest(obj)
 
 
+def _is_changed(obj):
+    """Whether the user changed a mesh since it was made, or gave the object another: by hand, or by sculpting what its
+    modifiers make of it."""
+    sculpted = any(modifier.total_levels for modifier in _multires(obj))
+    return sculpted or len(obj.data.skin_vertices) > 0 or obj[results.MADE] != _digest(obj)
+
+
+def _multires(obj):
+    return [modifier for modifier in obj.modifiers if modifier.type == "MULTIRES"]
+
+
 def _digest(obj):
     """A text that tells meshes apart by their points and faces, what these carry and their shapes; not by materials,
     nor by whether they are smooth."""
     mesh, corners = obj.data, np.empty(len(obj.data.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     carried = {name: found.values for name, found in sorted(attributes.read(mesh).items())}
-    there = (one for one in mesh.attributes if not one.name.startswith(".") and one.name != "sharp_face")
-    names = sorted((one.name, one.domain, one.data_type) for one in there)
+    there = ((one.name, one.domain, one.data_type) for one in mesh.attributes if one.name != "sharp_face")
+    names = sorted(one for one in there if one[0] in _SCULPTED or not one[0].startswith("."))
     shapes_of = mesh.shape_keys.key_blocks.keys() if mesh.shape_keys else []
     digest = hashlib.blake2b(repr((names, obj.vertex_groups.keys(), shapes_of)).encode(), digest_size=16)
     for values in (attributes.values(mesh.attributes["position"]), corners, *carried.values()):
@@ -190,12 +206,15 @@ def _digest(obj):
 
 
 def _set_aside(scene, obj):
-    """Keep a result that the user changed, hidden, as an object that no run replaces; a line that says so."""
+    """Keep a result that the user changed, hidden, as an object that no run replaces; a line that says so. What was
+    sculpted at several resolutions goes with it, as it suits no other faces."""
     kept = obj.copy()
     kept.data = obj.data.copy()
     kept.name = kept.data.name = f"{obj.name} changed"
     for name in (results.ROLE, results.ORIGIN, results.BOX, results.MADE):
         kept.pop(name, None)
+    for modifier in _multires(obj):
+        obj.modifiers.remove(modifier)
     scene.collection.objects.link(kept)
     results.show(scene, kept, False)
     return f"{obj.name} was changed since it was made: {kept.name}, hidden, keeps what it was"
@@ -203,9 +222,15 @@ def _set_aside(scene, obj):
 
 def moved_within(obj: bpy.types.Object) -> bool:
     """Whether the points of a mesh or of samples among the results were moved within it since it was made, by Apply
-    Transforms or Set Origin. With fewer points or more, it was edited."""
+    Transforms or Set Origin. With fewer points or more, it was edited: then whether the middle of the box around them
+    is closer to where applying its place puts it than to where it was."""
     before, now = list(obj.get(results.BOX, ())), _box(obj.data)
-    return before[:1] == now[:1] and before != now
+    if before[:1] == now[:1]:
+        return before != now
+    if not len(before) == len(now) == 7:
+        return False
+    shift = np.subtract(now[1:], before[1:]).reshape(2, 3).mean(axis=0)
+    return bool(np.linalg.norm(shift - np.array(obj[results.ORIGIN])) < np.linalg.norm(shift))
 
 
 def _box(data):
@@ -227,7 +252,7 @@ def _show_mesh_first(scene, collection, stays):
 def _stay_active(layers, mesh):
     """Where a result that went was the active object, the mesh is it now."""
     for layer in layers:
-        if layer.objects.active is None and mesh is not None and mesh.name in layer.objects:
+        if layer.objects.active is None and mesh is not None and results.is_among(mesh, layer.objects):
             layer.objects.active = mesh
             mesh.select_set(True, view_layer=layer)
 

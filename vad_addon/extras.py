@@ -9,13 +9,14 @@ from . import axes, points_in, results, shapes
 
 
 def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
-    """The run whose results are meant: the one the active object belongs to, else one of what is selected, else one
-    that this was joined for. The scene's last where nothing that can be read is active."""
+    """The run whose results are meant: the one that the active object is a result of, or whose collection it is in if
+    it holds no points; else one of what is selected, else one that this was joined for. The scene's last where nothing
+    that can be read is active."""
     obj = points_in.active_object(context)
     if obj is None:
         return context.scene.vad.result
-    own = None if results.is_copy(obj) else results.run_of(obj)
-    found = own or results.previous(context.scene, points_in.sources(context))
+    is_scan = obj.type in points_in.READABLE and (results.role(obj) is None or results.is_copy(obj))
+    found = (None if is_scan else results.run_of(obj)) or results.previous(context.scene, points_in.sources(context))
     if found is not None or obj.type in points_in.READABLE:
         return found or results.joined(context.scene, obj)
     return context.scene.vad.result
@@ -154,8 +155,8 @@ class VAD_OT_show(bpy.types.Operator):
         return next(f"Show or hide {text}" for role, _, text in results.SHOWN if role == properties.role)
 
     def execute(self, context):
-        collection = chosen_result(context)
-        objects = [obj for obj in results.shown_as(collection, self.role) if obj.name in context.scene.objects]
+        collection, there = chosen_result(context), context.scene.objects
+        objects = [obj for obj in results.shown_as(collection, self.role) if results.is_among(obj, there)]
         if not objects:
             self.report({"ERROR"}, f"{collection.name} has no {self.role}: it was deleted, or not asked for")
             return {"CANCELLED"}

@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import job, points_in, results, run
+from . import extras, job, points_in, results, run
 from .delivery import deliver
 from .outcome import Task
 from .properties import RUN_OPTIONS, chosen, settings_from, settings_properties
@@ -22,12 +22,16 @@ class VAD_OT_reconstruct(run.Run, bpy.types.Operator):
         options = chosen(context.scene.vad, self.properties)
         self._keep_both = options["keep_both"]
         self._source = points_in.selected(context, options["selected_only"])
+        meant, made_from = extras.chosen_result(context), set(points_in.objects_of(self._source))
+        updated = meant is not None and set(results.sources(meant)) == made_from and results.can_be_updated(meant)
+        self._updated = meant.session_uid if updated and not options["keep_both"] else None
         settings = settings_from(context.scene.vad, self.properties)
         return Task(self._source.points, settings, self._source.constraints)
 
     def deliver(self, context, scene, found):
         known = set(scene.collection.children_recursive)
-        collection = deliver(scene, self._source, found, self._keep_both)
+        updated = results.again(scene, self._updated)
+        collection = deliver(scene, self._source, found, self._keep_both, updated)
         mesh = results.mesh(collection)
         if mesh is not None and collection not in known and not bpy.app.background:
             results.take_the_stage(context, mesh, self._source.uids)

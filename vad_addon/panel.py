@@ -100,7 +100,7 @@ class VAD_PT_look(_Sidebar, bpy.types.Panel):
         self.layout.label(text=collection.name, icon="OUTLINER_COLLECTION")
         row = self.layout.row(align=True)
         for role, name, _ in results.SHOWN:
-            objects = [obj for obj in results.shown_as(collection, role) if obj.name in layer.objects]
+            objects = [obj for obj in results.shown_as(collection, role) if results.is_among(obj, layer.objects)]
             if objects:
                 shown = all(obj.visible_get() for obj in objects)
                 row.operator(extras.VAD_OT_show.bl_idname, text=name, depress=shown).role = role

@@ -142,11 +142,13 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
     axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
     fixed = np.flatnonzero(axes.any(axis=1))
     uids, constraints = tuple(obj.session_uid for obj in objects), (fixed, axes[fixed]) if len(fixed) else None
-    return Source(objects[0].name, uids, points, joined, constraints, tuple(_left_out(objects, joined, context)))
+    found = {name for _, carried in clouds for name in carried} - {AXIS}
+    return Source(objects[0].name, uids, points, joined, constraints, tuple(_left_out(objects, found, joined, context)))
 
 
-def _left_out(objects, carried, context):
-    """What is there and not among the points, or what they carry, a line on each kind."""
+def _left_out(objects, found, carried, context):
+    """What is there and not among the points, or what they carry, of names that are `found` on some of them; a line on
+    each kind."""
     for obj in objects:
         if count := _instances_with_points(_geometry(obj, context)):
             yield (
@@ -154,9 +156,10 @@ def _left_out(objects, carried, context):
                 "Instances at the end of its geometry nodes"
             )
     names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
-    names += [group.name for obj in objects for group in obj.vertex_groups]
+    names += [*found, *(group.name for obj in objects for group in obj.vertex_groups)]
     if lost := sorted(set(names) - set(carried)):
-        yield f"Not carried over: {', '.join(lost)}; only numbers and colors of points are, no vertex groups"
+        kinds = "only numbers and colors of points are, of one type in all objects, no vertex groups"
+        yield f"Not carried over: {', '.join(lost)}; {kinds}"
 
 
 def _instances_with_points(geometry):
@@ -224,15 +227,26 @@ def _components(evaluated, geometry, selected_only):
         yield _picked(_values(mesh.vertices, "co", np.float32, 3), mesh, flags)
         evaluated.to_mesh_clear()
     elif geometry.mesh:
+        if selected_only:
+            raise _not_told(evaluated)
         yield _values(geometry.mesh.vertices, "co", np.float32, 3), attributes.read(geometry.mesh)
     for cloud in filter(_has_points, (geometry.pointcloud, geometry.curves)):
         flags = None
         if selected_only:
             flags = _spline_selection(evaluated) if evaluated.type == "CURVE" else _cloud_selection(cloud)
+        if flags is not None and len(flags) != cloud.attributes.domain_size("POINT"):
+            raise _not_told(evaluated)
         yield _picked(attributes.values(cloud.attributes["position"]), cloud, flags)
     instances = geometry.instances_pointcloud()
     if _has_points(instances):  # their "position" is uninitialised memory in Blender 4.5 and 5.0
         yield _values(instances.attributes["instance_transform"].data, "value", np.float32, 16)[:, 12:15], {}
+
+
+def _not_told(obj):
+    return InputError(
+        f"{obj.name}: its bevel, modifiers or geometry nodes make other points, of which none is selected: turn off "
+        "Selected Points Only, or those"
+    )
 
 
 def _picked(points, data, flags):
@@ -257,7 +271,7 @@ def _cloud_selection(cloud):
 
 
 def _spline_selection(obj):
-    """The same of the control points of a curve object of splines, without modifiers that add some."""
+    """The same of the control points of a curve object of splines."""
     points = [
         (spline.bezier_points, "select_control_point") if spline.type == "BEZIER" else (spline.points, "select")
         for spline in obj.original.data.splines

@@ -53,21 +53,26 @@ def members(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     return [obj for wanted in ROLES if (obj := member(collection, wanted)) is not None]
 
 
+def all_of(collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """The results of a run and what else of such kind is in its collection: those that follow them, and copies."""
+    return [*members(collection), *(obj for obj in collection.objects if role(obj) is not None)]
+
+
 def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
     """Make `obj` the one that plays its role in the results of a run."""
     collection[MEMBERS] = {role(one): one for one in (*members(collection), obj)}
 
 
 def run_of(obj: bpy.types.Object) -> bpy.types.Collection | None:
-    """The collection of the run that `obj` is a result of, wherever it was moved; else the one that it is in; else that
-    of the result that it follows."""
+    """The collection of the run that `obj` is a result of, or that the result is of which it follows, wherever it was
+    moved; else the one that it is in."""
+    follows = role(obj) not in {None, *ROLES} and obj.parent is not None
+    if follows and (run := run_of(obj.parent)) is not None:
+        return run
     runs = [collection for collection in bpy.data.collections if REPORT in collection]
     homes = [run for run in runs if obj in run.objects.values()]
     known = [run for run in (*homes, *runs) if MEMBERS in run] if role(obj) in ROLES else []
-    found = [run for run in known if obj in members(run)] or homes
-    if not found and role(obj) is not None and obj.parent is not None:
-        return run_of(obj.parent)
-    return found[0] if found else None
+    return next((run for run in known if obj in members(run)), homes[0] if homes else None)
 
 
 def is_copy(obj: bpy.types.Object) -> bool:
@@ -110,7 +115,7 @@ def _holder(obj):
 def origins(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """What the result `obj` was made from, as far as that is in the scene."""
     made_from = sources(_holder(obj)) if role(obj) is not None else []
-    return [source for source in made_from if source is not None and source.name in scene.objects]
+    return [source for source in made_from if source is not None and is_among(source, scene.objects)]
 
 
 def gone(obj: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
@@ -139,6 +144,11 @@ def previous(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bpy.typ
     return scene.vad.result if scene.vad.result in made else (made or [None])[-1]
 
 
+def again(scene: bpy.types.Scene, uid: int | None) -> bpy.types.Collection | None:
+    """The collection in `scene` with this `session_uid`, if it is still there."""
+    return next((one for one in scene.collection.children_recursive if one.session_uid == uid), None)
+
+
 def joined(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Collection | None:
     """The latest results that a run made of `obj`, or of several objects that it is one of; the last run's may be out
     of the scene."""
@@ -164,12 +174,16 @@ def home(collections, scene: bpy.types.Scene) -> bpy.types.Collection:
 
 def can_be_updated(collection: bpy.types.Collection) -> bool:
     """Whether `collection` and all results in it are of this .blend."""
-    found = (*members(collection), *(obj for obj in collection.objects if role(obj) is not None))
-    return is_editable(collection) and all(map(_is_own, found))
+    return is_editable(collection) and all(map(_is_own, all_of(collection)))
 
 
 def _is_own(obj):
     return is_editable(obj) and (obj.data is None or is_editable(obj.data))
+
+
+def is_shown_otherwise(obj: bpy.types.Object) -> bool:
+    """Whether an object of the user's shows the same data as the result `obj`; copies of results are none such."""
+    return any(other.data == obj.data and ROLE not in other for other in bpy.data.objects)
 
 
 def are_edited(objects: list[bpy.types.Object]) -> bool:
@@ -222,8 +236,14 @@ def show(scene: bpy.types.Scene, obj: bpy.types.Object, shown: bool) -> None:
         obj.hide_render = not shown
     for layer in scene.view_layers:
         layer.update()
-        if obj.name in layer.objects:
+        if is_among(obj, layer.objects):
             obj.hide_set(not shown, view_layer=layer)
+
+
+def is_among(obj: bpy.types.Object, objects: bpy.types.bpy_prop_collection) -> bool:
+    """Whether `obj` is among those of a scene or of a view layer, where linked ones may be called the same."""
+    called_so = objects.get(obj.name)
+    return called_so == obj or (called_so is not None and obj in objects.values())
 
 
 def unseen(obj: bpy.types.Object) -> str:
@@ -263,7 +283,7 @@ def take_the_stage(context: bpy.types.Context, obj: bpy.types.Object, uids: tupl
     made_from = {source for source in layer.objects if source.session_uid in uids}
     active = layer.objects.active
     looked_at = {active, *(origins(active, context.scene) if active else ())}
-    if obj.name not in layer.objects or context.mode != "OBJECT" or not looked_at & made_from:
+    if not is_among(obj, layer.objects) or context.mode != "OBJECT" or not looked_at & made_from:
         return
     for other in layer.objects:
         other.select_set(False)

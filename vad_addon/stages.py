@@ -160,8 +160,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         return Task(points, settings, known=(axes, confidence), origin=centre, volume=volume)
 
     def deliver(self, context, scene, found):
-        of_scene = scene.collection.children_recursive
-        collection = next((one for one in of_scene if one.session_uid == self._collection), None)
+        collection = results.again(scene, self._collection)
         report_run(self, context, deliver(scene, self._source, found, collection=collection))
 
 

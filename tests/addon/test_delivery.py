@@ -269,17 +269,42 @@ def test_an_object_whose_transforms_were_applied_is_placed_anew(blender, run, sc
     assert positions(surface.data).mean(axis=0)[2] + surface.location.z == pytest.approx(10, abs=0.05)
 
 
+@pytest.mark.parametrize("role", ["surface", "samples"])
+def test_one_that_was_edited_once_its_transforms_were_applied_is_placed_anew(blender, run, scan, role):
+    scan.location = 0, 0, 10
+    obj = run()[role]
+    make_active(blender, obj)
+    blender.ops.object.transform_apply(location=True)
+    if role == "surface":
+        obj.modifiers.new("Fewer", "DECIMATE").ratio = 0.5
+        blender.ops.object.modifier_apply(modifier="Fewer")
+    else:
+        blender.ops.object.mode_set(mode="EDIT")
+        kept = obj.data.attributes.get(".selection") or obj.data.attributes.new(".selection", "BOOLEAN", "POINT")
+        kept.data.foreach_set("value", np.arange(500) < 20)
+        blender.ops.pointcloud.delete()
+        blender.ops.object.mode_set(mode="OBJECT")
+        assert blender.ops.vad.reextract(resolution=24) == {"FINISHED"}
+    if role == "surface":
+        make_active(blender, scan)
+        run()
+    surface = blender.data.objects["Scan surface"]
+    assert positions(surface.data).mean(axis=0)[2] + surface.location.z == pytest.approx(10, abs=0.05)
+
+
 @pytest.mark.parametrize(
     ("how", "then"),
     [
         *(("sculpted", "double"), ("joined", "double"), ("joined", "single"), ("joined", "none")),
         *(("painted", "double"), ("unwrapped", "single"), ("weighted", "none"), ("keyed", "double")),
+        *(("subdivided", "double"), ("masked", "double"), ("skinned", "double")),
     ],
 )
 def test_a_mesh_that_the_user_changed_is_kept_beside_the_next(
     blender, run, scan, add_mesh, sphere, extension, how, then
 ):
     surface = run()["surface"]
+    make_active(blender, surface)
     if how == "sculpted":
         surface.data.vertices[7].co *= 0.99
     elif how == "joined":
@@ -291,6 +316,13 @@ def test_a_mesh_that_the_user_changed_is_kept_beside_the_next(
         surface.data.uv_layers.new(name="UVMap")
     elif how == "weighted":
         surface.vertex_groups.new(name="Soft").add([7], 1.0, "REPLACE")
+    elif how == "subdivided":
+        surface.modifiers.new("Multires", "MULTIRES")
+        blender.ops.object.multires_subdivide(modifier="Multires")
+    elif how == "masked":
+        surface.data.attributes.new(".sculpt_mask", "FLOAT", "POINT")
+    elif how == "skinned":
+        surface.modifiers.new("Skin", "SKIN").show_viewport = False
     else:
         surface.shape_key_add(name="Basis")
     count, objects = len(surface.data.vertices), set(blender.data.objects)
@@ -307,6 +339,18 @@ def test_a_mesh_that_the_user_changed_is_kept_beside_the_next(
     assert kept.name in blender.context.scene.objects
     make_active(blender, kept)
     assert extension("vad_addon.points_in").sources(blender.context) == [kept]
+
+
+def test_a_mesh_of_the_users_that_a_result_shows_stays(blender, run, scan, extension):
+    surface = run()["surface"]
+    triangle = blender.data.meshes.new("Retopo")
+    triangle.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    theirs = blender.data.objects.new("Retopo", triangle)
+    surface.data = triangle
+    made = run()
+    assert (theirs.data, len(triangle.vertices)) == (triangle, 3)
+    assert len(made["surface"].data.vertices) > 100
+    assert extension("vad_addon.results").warnings(blender.context.scene.vad.result) == []
 
 
 def test_of_a_mesh_that_looks_otherwise_alone_nothing_is_kept(blender, run, scan):
@@ -407,6 +451,15 @@ def test_both_are_kept_where_asked(blender, run, scan):
     assert third == second
 
 
+def test_of_several_that_were_kept_the_one_at_hand_is_updated(blender, run, scan):
+    first = run()["surface"]
+    second = run(keep_both=True, resolution=16)["surface"]
+    faces = len(second.data.polygons)
+    make_active(blender, first)
+    run(resolution=32)
+    assert len(first.data.polygons) > faces == len(second.data.polygons)
+
+
 def test_another_source_of_the_same_name_updates_nothing(blender, run, scan, add_mesh, sphere):
     first = run()
     scan.select_set(False)
@@ -460,6 +513,17 @@ def test_results_being_edited_stay_as_they_are(blender, run, scan, extension):
     assert not set(made.objects) & set(first.values())
     (warning,) = extension("vad_addon.results").warnings(made)
     assert "is being edited" in warning
+
+
+def test_results_beside_which_the_scan_is_edited_are_updated(blender, run, scan):
+    run()
+    made = blender.context.scene.vad.result
+    move(blender, scan)
+    made.objects.link(scan)
+    make_active(blender, scan)
+    blender.ops.object.mode_set(mode="EDIT")
+    assert blender.ops.vad.reconstruct(resolution=16) == {"FINISHED"}
+    assert blender.context.scene.vad.result == made
 
 
 def test_results_edited_by_way_of_a_duplicate_stay_as_they_are(blender, run, scan):
@@ -566,6 +630,16 @@ def test_a_run_says_where_its_mesh_is_not_seen(blender, run, scan, capfd, how):
         assert told == (how != "its own eye")
 
 
+def test_another_object_of_its_name_is_not_the_scan_of_linked_results(blender, run, scan, linked, add_mesh, sphere):
+    run()
+    collection = linked()
+    add_mesh("Scan", sphere)
+    (mesh,) = (obj for obj in collection.objects if obj.type == "MESH")
+    make_active(blender, mesh)
+    with pytest.raises(RuntimeError, match="The scan of Scan surface is gone, or unknown"):
+        blender.ops.vad.reconstruct()
+
+
 def test_whether_renders_show_a_linked_scan_is_left_to_its_file(blender, scan, folder, capfd):
     blender.data.libraries.write(str(folder / "scan.blend"), {scan})
     blender.ops.wm.read_homefile(use_empty=True)
@@ -649,6 +723,28 @@ def test_of_many_collections_only_those_of_runs_are_looked_into(
     assert found == (None if active == "other" else blender.context.scene.vad.result)
     assert len(read) < 10
     assert not walked
+
+
+@pytest.mark.parametrize("which", ["scan", "shell"])
+def test_what_lies_among_the_results_of_another_run_is_none_of_them(
+    blender, run, scan, add_mesh, sphere, extension, which
+):
+    run()
+    others = blender.context.scene.vad.result
+    second = add_mesh("Second", 2 * sphere)
+    make_active(blender, second)
+    move(blender, second)
+    others.objects.link(second)
+    chosen = extension("vad_addon.extras").chosen_result
+    assert chosen(blender.context) is None
+    assert blender.ops.vad.reconstruct(resolution=16) == {"FINISHED"}
+    own = blender.context.scene.vad.result
+    if which == "shell":
+        blender.ops.vad.shell()
+        shell = blender.context.active_object
+        move(blender, shell)
+        others.objects.link(shell)
+    assert chosen(blender.context) == own != others
 
 
 def test_shells_that_were_moved_to_another_collection_still_follow(blender, run, scan, extension):

@@ -344,6 +344,62 @@ def test_an_empty_selection_is_refused(blender, gather, add_mesh, sphere, extens
         gather(selected_only=True)
 
 
+def test_a_selection_that_does_not_reach_the_points_is_no_selection(blender, gather, add):
+    line = blender.data.curves.new("Line", "CURVE")
+    line.splines.new("POLY").points.add(9)
+    for k, point in enumerate(line.splines[0].points):
+        point.co, point.select = (k, 0, 0, 1), k < 3
+    curve = add("Line", line)
+    blender.ops.object.mode_set(mode="EDIT")
+    assert len(gather(selected_only=True).points) == 3
+    line.bevel_depth = 0.1
+    with pytest.raises(Exception, match="Line: its bevel, modifiers or geometry nodes make other points"):
+        gather(selected_only=True)
+    line.bevel_depth = 0
+    nodes = blender.data.node_groups.new("Fewer", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        nodes.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    start, fewer, end = (
+        nodes.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeResampleCurve", "NodeGroupOutput")
+    )
+    fewer.inputs["Count"].default_value = 5
+    nodes.links.new(start.outputs[0], fewer.inputs[0])
+    nodes.links.new(fewer.outputs[0], end.inputs[0])
+    curve.modifiers.new("Fewer", "NODES").node_group = nodes
+    with pytest.raises(Exception, match="make other points"):
+        gather(selected_only=True)
+
+
+def test_joined_colours_and_numbers_of_other_types_line_up(gather, add_mesh, sphere):
+    first, second, none = (add_mesh(name, points) for name, points in (("A", sphere), ("B", sphere + 3), ("C", [])))
+    for obj, kind, value in ((first, "FLOAT_COLOR", 0.25), (second, "BYTE_COLOR", 1.0), (none, "FLOAT", 0.0)):
+        attribute = obj.data.attributes.new("Col", kind, "POINT")
+        if obj != none:
+            attribute.data.foreach_set("color", np.full(2000, value, np.float32))
+    for name, kinds in {"label": ("INT", "FLOAT"), "mixed": ("FLOAT", "FLOAT_VECTOR")}.items():
+        for obj, kind, value in zip((first, second), kinds, (7, 0.5), strict=True):
+            attribute = obj.data.attributes.new(name, kind, "POINT")
+            if kind != "FLOAT_VECTOR":
+                attribute.data.foreach_set("value", np.full(500, value, np.int32 if kind == "INT" else np.float32))
+    found = gather()
+    kind, values = found.attributes["Col"].kind, found.attributes["Col"].values
+    assert (kind, set(values[:500].ravel()), set(values[500:].ravel())) in [
+        ("FLOAT_COLOR", {0.25}, {1.0}),
+        ("FLOAT_COLOR", {1.0}, {0.25}),
+    ]
+    assert sorted(set(found.attributes["label"].values)) == [0.5, 7.0]
+    assert "mixed" not in found.attributes
+    assert any(line.startswith("Not carried over: mixed;") for line in found.warnings)
+
+
+def test_colours_of_corners_without_faces_are_told(blender, gather, add_mesh, sphere):
+    scan = add_mesh("Scan", sphere)
+    scan.data.attributes.new("Col", "BYTE_COLOR", "CORNER")
+    found = gather()
+    assert "Col" not in found.attributes
+    assert found.warnings[0].startswith("Not carried over: Col;")
+
+
 def test_attributes_of_joined_objects_line_up(gather, add_mesh, sphere):
     for name, count in (("Plain", 3), ("Scan", 4)):
         obj = add_mesh(name, sphere[:count])
