@@ -4,7 +4,7 @@ import argparse
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from difflib import get_close_matches
 from functools import partial
@@ -228,8 +228,10 @@ def _spare(scan, digest, folder, arrays):
             raise InputError(f"{path} would replace the scan, which is that file; give another folder for the results")
     report = report_of(folder / f"{scan.stem}{_REPORT}")
     if report:
-        other = Path(report["scan"])
-        if not (other.samefile(scan) if other.is_file() else report.get("digest") == digest):  # it may have been moved
+        other, same = Path(report["scan"]), report.get("digest") == digest  # it may have been moved, or out of reach
+        with suppress(OSError):
+            same = other.samefile(scan)
+        if not same:
             raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
     for path in there:
         if not is_own(path):

@@ -13,7 +13,7 @@ def real_numbers(given, what: str, wanted: str) -> np.ndarray:
         if np.iscomplexobj(given):
             raise TypeError("complex numbers")
         return np.asarray(np.ma.filled(given.astype(np.float64), np.nan))
-    except (TypeError, ValueError, OverflowError) as error:
+    except (TypeError, ValueError, OverflowError, RuntimeError) as error:  # the last of tensors that need gradients
         raise InputError(f"{what} are not an array of real numbers ({error}); give {wanted}") from error
 
 

@@ -35,11 +35,11 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
     nothing is to do. Raises :class:`InputError` for points that are not finite and for spacings that are none,
-    :class:`SettingsError` for another strength.
+    :class:`SettingsError` for another strength or seed.
     """
     progress, given, points = Progress.of(progress), points, finite_points(points)
     spacing = spacing_of(points, spacing)
-    strength = Settings(denoise=strength).denoise
+    strength = Settings(denoise=strength, seed=seed).denoise
     if len(points) <= LADDER[0] or strength == 0:
         return given, {}
     voxels = find_voxels(points, seed)

@@ -18,23 +18,48 @@ _kept = local()  # `waiting`, the files that are to take their places together, 
 @contextmanager
 def together() -> Iterator[None]:
     """Within, files of :func:`atomic_path` wait for each other: they take their places in the order they were written,
-    when the block ends without an error, else none of them does.
+    when the block ends without an error and all of them can, else none of them does.
 
     The last one tells of the others: an old one in its place goes before they do, so that it is never untrue.
     """
     _kept.waiting = waiting = []
     try:
         yield
-        for _, path in waiting[-1:]:
-            with _errors_of(path):
-                path.unlink(missing_ok=True)
-        for temporary, path in waiting:
-            with _errors_of(path):
-                os.replace(temporary, path)
+        _take_places(waiting)
     finally:
         del _kept.waiting
         for temporary, _ in waiting:
             _remove(temporary)
+
+
+def _take_places(waiting):
+    """Put files, (temporary, path) each, in their places, for what is there; it comes back where one cannot be put."""
+    before, new = [], []
+    try:
+        for _, path in reversed(waiting):
+            if path.is_file():
+                with _errors_of(path):
+                    old = _beside(path)
+                    os.replace(path, old)
+                    before.append((old, path))
+        for temporary, path in waiting:
+            with _errors_of(path):
+                os.replace(temporary, path)
+                new.append(path)
+    except BaseException:
+        for path in new:
+            _remove(path)
+        for old, path in reversed(before):
+            with suppress(OSError):
+                os.replace(old, path)
+        raise
+    for old, _ in before:
+        _remove(old)
+
+
+def _beside(path):
+    """A path of no file, in the same folder."""
+    return path.with_name(f".{uuid4().hex}{path.suffix}")
 
 
 @contextmanager
@@ -49,7 +74,7 @@ def atomic_path(path: str | os.PathLike, otherwise: str = ELSEWHERE) -> Iterator
     path = Path(path)
     if not path.name:
         raise VADError(f"'{path}' is a folder; give the path of a file")
-    temporary = path.with_name(f".{uuid4().hex}{path.suffix}")
+    temporary = _beside(path)
     waiting = getattr(_kept, "waiting", None)
     try:
         with _errors_of(path, otherwise):

@@ -10,18 +10,19 @@ from ..errors import InputError
 XYZ = {"x": 0, "y": 1, "z": 2}
 COLOURS = "red", "green", "blue"
 _COLOUR = dict(zip("rgb", COLOURS, strict=True))
+_KNOWN = {*XYZ, *_COLOUR, *COLOURS, "intensity", "nx", "ny", "nz"}
 _NO_NAME = re.compile(r"\W+", re.ASCII)  # what names of properties in PLY files may not have
 _OF_SCANNERS = {4: ("intensity",), 7: ("intensity", *COLOURS)}
 
 
 def named_columns(path, names: list[str]) -> dict[str, int]:
-    """Where columns of these names are, x, y and z first; three of other names are taken for those. Columns of one name
-    are numbered from the second on. Raises :class:`InputError` for more columns without them."""
+    """Where columns of these names are, x, y and z first; three of names that say nothing else are taken for those.
+    Columns of one name are numbered from the second on. Raises :class:`InputError` for others without them."""
     columns = {}
     for column, name in enumerate(names):
         columns[not_among(columns, _plain(name) or f"column_{column + 1}")] = column
     if not XYZ.keys() <= columns.keys():
-        if len(names) > 3:
+        if len(names) > 3 or columns.keys() & _KNOWN:
             seen = ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
             raise InputError(f"{path} has {len(names)} columns, named {seen}; name those of the coordinates x, y and z")
         return XYZ
@@ -69,5 +70,4 @@ def not_among(taken, name: str) -> str:
 
 def _plain(name):
     name = _NO_NAME.sub("_", name.strip('" ')).strip("_")
-    known = {*XYZ, *_COLOUR, *COLOURS, "intensity", "nx", "ny", "nz"}
-    return name.lower() if name.lower() in known else name
+    return name.lower() if name.lower() in _KNOWN else name

@@ -7,7 +7,7 @@ from codecs import BOM_UTF8
 from pathlib import Path
 
 import numpy as np
-from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError
+from plyfile import PlyData, PlyElement, PlyListProperty, PlyParseError, PlyProperty
 
 from ..errors import InputError
 from .columns import not_among
@@ -57,7 +57,16 @@ def _read(content):
     if last == len(names) - 1 and rest.strip():
         raise ValueError(f"its header claims {counts[last]} vertices, but more data follows them")
     points = np.stack([vertices[axis].astype(np.float64) for axis in axes], axis=1)
-    return points, {p.name: vertices[p.name] for p in vertex.properties if p.name in scalars - set(axes)}
+    further = (p for p in vertex.properties if p.name in scalars - set(axes))
+    return points, {p.name: _as_declared(vertices[p.name], p.dtype()) for p in further}
+
+
+def _as_declared(values, kind):
+    """The values in the type that the header declares, where that holds them all."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = values.astype(kind)
+    held = np.isfinite(found) == np.isfinite(values) if found.dtype.kind == "f" else found == values
+    return found if held.all() else values
 
 
 def _header(content):
@@ -110,10 +119,16 @@ def _smallest_row(element, layout):
     )
 
 
+def _in_double(found):
+    return found if isinstance(found, PlyListProperty) else PlyProperty(found.name, "f8")
+
+
 def _read_rows(elements, counts, layout, body):
     """The rows of the last of `elements` and the bytes or text after them, by plyfile, row by row; it warns of lists
-    that are empty in text."""
-    elements = [PlyElement(e.name, e.properties, n) for e, n in zip(elements, counts, strict=False)]
+    that are empty in text. Numbers in text are read in double precision: that is what digits may be of, and some hold
+    what the header's type does not."""
+    properties = [[_in_double(p) if layout.text else p for p in e.properties] for e in elements]
+    elements = [PlyElement(e.name, held, n) for e, held, n in zip(elements, properties, counts, strict=False)]
     header = PlyData(elements, layout.text, layout.byte_order).header
     if layout.text:
         lines = spelt_plainly(body.decode("ascii", errors="replace")).splitlines()

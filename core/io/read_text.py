@@ -80,6 +80,10 @@ def _read(path, wanted=None):
             first = next(rows, "")
         elif not any(map(_is_number, _cells(first, _mark_in(first)))):
             header, first = first, next(rows, "")
+        elif _is_numbering(first):
+            numbering, first = first, next(rows, "")
+            if all(cell.isdecimal() for cell in _cells(first, _mark_in(first))):  # whole numbers all over: a point
+                first, rows = numbering, chain([first], rows)
         columns, named, mark = _columns(path, header, lines.comment, first)
         further = list(columns)[3:]
         guessed = not named and further == list(COLOURS)
@@ -227,6 +231,12 @@ def _cells(row, mark):
 
 def _is_count(line):
     return (line := line.strip()).isdecimal() and len(line) < 19
+
+
+def _is_numbering(line):
+    """Whether a line counts columns from 0 on, between commas, as tables without names are written."""
+    cells = _cells(line, ",")
+    return len(cells) >= 3 and cells == list(map(str, range(len(cells))))
 
 
 def _is_number(token):

@@ -109,15 +109,15 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
     """Constraints given by rows of an input of `count` rows, as (rows of the samples used, unit axes), and warnings;
     None, or none of them, gives None.
 
-    Rows that were dropped (duplicates, strays, NaN) are ignored, which is what the warning says. Raises
-    :class:`InputError` for shapes that do not match, rows outside the input, rows with more than one axis, or axes
-    without a direction.
+    Rows that were dropped (duplicates, strays, NaN) are ignored, which is what the warning says, and so are indices
+    that are masked. Raises :class:`InputError` for shapes that do not match, rows outside the input, rows with more
+    than one axis, or axes without a direction.
     """
     if constraints is None:
         return None, ()
     try:
         indices, axes = constraints
-        indices = np.asarray(indices)
+        indices = np.asanyarray(indices)
     except (TypeError, ValueError) as error:
         raise InputError(f"constraints are not (indices, axes): {error}") from error
     axes = real_numbers(axes, "constraint axes", "a (k,3) array")
@@ -127,6 +127,8 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
         raise InputError(
             f"constraints have shapes {indices.shape} and {axes.shape}; give whole-number indices (k,) and axes (k,3)"
         )
+    given = ~np.ma.getmaskarray(indices)
+    indices, axes = np.asarray(indices)[given], axes[given]
     outside = (indices < 0) | (indices >= count)
     if outside.any():
         raise InputError(

@@ -261,6 +261,26 @@ def test_results_of_another_scan_of_that_name_stay(capsys, scan, calls, tmp_path
     assert (tmp_path / "out" / "ball.json").read_bytes() == written
 
 
+def test_results_of_a_scan_out_of_reach_are_told_by_its_digest(capsys, scan, calls, tmp_path, monkeypatch):
+    assert run(capsys, "reconstruct", scan, "-o", tmp_path / "out")[0] == 0
+    (tmp_path / "b").mkdir()
+    copy = tmp_path / "b" / "ball.npy"
+    copy.write_bytes(Path(scan).read_bytes())
+    samefile = Path.samefile
+
+    def denied(path, other):
+        if str(path) == str(scan):
+            raise PermissionError(13, "Permission denied", str(path))
+        return samefile(path, other)
+
+    monkeypatch.setattr(Path, "samefile", denied)
+    assert run(capsys, "reconstruct", copy, "-o", tmp_path / "out")[0] == 0
+    report = tmp_path / "out" / "ball.json"
+    report.write_text(json.dumps(json.loads(report.read_text()) | {"scan": str(scan)}))
+    np.save(copy, np.load(copy) + 1)
+    assert f"holds the results of {scan}" in refused(capsys, "reconstruct", copy, "-o", tmp_path / "out")
+
+
 def test_a_scan_that_was_moved_updates_its_results(capsys, scan, calls, tmp_path):
     assert run(capsys, "reconstruct", scan, "-o", tmp_path / "out")[0] == 0
     (tmp_path / "b").mkdir()

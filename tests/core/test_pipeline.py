@@ -292,6 +292,25 @@ def test_no_constraints_and_constraints_on_dropped_rows_change_nothing():
         assert reconstruct(points, FIELD_ONLY, constraints).normals.tobytes() == plain.normals.tobytes()
 
 
+def test_masked_indices_of_constraints_are_left_out():
+    points = shapes.sphere(200)
+    masked = np.ma.array([3, 5], mask=[True, False])
+    (with_both, with_one) = (reconstruct(points, FIELD_ONLY, given) for given in ((masked, EYE[:2]), ([5], EYE[1:2])))
+    assert with_both.normals.tobytes() == with_one.normals.tobytes()
+
+
+class NeedsGradients:
+    """What refuses to become an array as a tensor does that gradients are asked of."""
+
+    def __array__(self, *_, **__):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad.")
+
+
+def test_what_refuses_to_be_an_array_is_named():
+    with pytest.raises(InputError, match=r"points are not an array of real numbers .*requires grad"):
+        reconstruct(NeedsGradients())
+
+
 @pytest.mark.parametrize(
     ("constraints", "message"),
     [

@@ -81,6 +81,8 @@ def test_stages_alone_refuse_what_a_run_refuses():
         fit_grid(np.empty((0, 3)), 16)
     with pytest.raises(SettingsError, match="denoise is 5"):
         denoise(points, spacing, 5)
+    with pytest.raises(SettingsError, match="seed is -1"):
+        denoise(points, spacing, 0.5, -1)
     for row in (300, -1):
         with pytest.raises(InputError, match=f"row {row} the first"):
             estimate_normals(points, spacing, constraints=([row], [[0, 0, 1.0]]))
@@ -116,8 +118,16 @@ def test_stages_alone_refuse_what_a_run_refuses():
             distance_field(surface, other)
         with pytest.raises(InputError, match="give a grid that holds it"):
             double_cover(values, near, surface, other, 1)
-    with pytest.raises(InputError, match=r"distances have shape \(17, 17, 17\) and the grid"):
-        double_cover(values, near, surface, fit_grid(points, 24), 1)
+    crossings, finer = find_crossings(near, surface, grid), fit_grid(points, 24)
+    sides = find_sides(values, crossings, surface, grid)
+    for stage in (
+        lambda: double_cover(values, near, surface, finer, 1),
+        lambda: find_crossings(near, surface, finer),
+        lambda: find_sides(values, crossings, surface, finer),
+        lambda: single_layer(values, near, crossings, sides, surface, finer),
+    ):
+        with pytest.raises(InputError, match=r"distances have shape \(17, 17, 17\) and the grid"):
+            stage()
     with pytest.raises(InputError, match=r"distances have shape \(\) and the grid"):
         double_cover(None, near, surface, grid, 1)
 

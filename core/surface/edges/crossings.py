@@ -76,7 +76,9 @@ def find_crossings(
     band: NearBand, surface: LocalSurface, grid: Grid, progress=None, meetings: Meetings | None = None
 ) -> Crossings:
     """Crossings of the zero set, from the nodes near it, and the `meetings` of sheets where these are known already.
-    On the way edges are called 3 * row + axis, by the row of the lower node in the band."""
+    On the way edges are called 3 * row + axis, by the row of the lower node in the band. Raises :class:`InputError` for
+    a band of another grid or one that does not hold the surface."""
+    grid.check(surface.points, band.shape)
     progress = Progress.of(progress)
     meetings = meetings or find_meetings(surface, progress.part(0.0, 0.1))
     meet = meeting_edges(band, surface, grid, meetings, _HAIR * grid.spacing, progress.part(0.1, 0.4))

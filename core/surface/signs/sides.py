@@ -99,8 +99,10 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     :func:`needed_band`, and the crossed grid edges.
 
     Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges. Of a surface with the
-    outside on both sides of most samples every crossing has one side at both ends.
+    outside on both sides of most samples every crossing has one side at both ends. Raises :class:`InputError` for
+    distances of another grid or one that does not hold the surface.
     """
+    grid.check(surface.points, np.shape(values))
     progress = Progress.of(progress)
     near, labels, count = _far_regions(values, surface, grid)
     outside = _outside(labels)

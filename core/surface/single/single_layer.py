@@ -35,8 +35,10 @@ def single_layer(
 
     Returns the mesh, in units of the samples, and the number of its edges across which it cannot be wound alike. A
     whole run goes on from here where sheets run side by side and this is rough, see :meth:`SingleLayer.told_apart`.
-    Raises :class:`SettingsError` where a double cover is needed and the box has no room for it.
+    Raises :class:`SettingsError` where a double cover is needed and the box has no room for it, and
+    :class:`InputError` for distances of another grid or one that does not hold the surface.
     """
+    grid.check(surface.points, np.shape(values), band.shape)
     cover = partial(double_cover, values, band, surface, grid, Settings().offset)
     layer = SingleLayer(values, band, surface, grid, cover, Progress.of(progress))
     vars(layer)["_crossings_and_sides"] = crossings, sides

@@ -55,12 +55,17 @@ def test_files_written_together_take_their_places_at_the_end_or_not_at_all(tmp_p
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file.txt": "new", "report.txt": "new"}
 
 
-def test_where_one_cannot_take_its_place_no_old_report_is_left(tmp_path):
-    (tmp_path / "report.txt").write_text("old")
-    (tmp_path / "file.txt" / "of_others").mkdir(parents=True)
-    with pytest.raises(VADError, match=r"file\.txt cannot be written"):
+@pytest.mark.parametrize(("taken", "other"), [("file.txt", "report.txt"), ("report.txt", "file.txt")])
+@pytest.mark.parametrize("there", [True, False])
+def test_where_one_cannot_take_its_place_all_stay_as_they_were(tmp_path, taken, other, there):
+    (tmp_path / taken / "of_others").mkdir(parents=True)
+    if there:
+        (tmp_path / other).write_text("old")
+    with pytest.raises(VADError, match=f"{taken} cannot be written"):
         write_both(tmp_path, "new")
-    assert os.listdir(tmp_path) == ["file.txt"]
+    assert sorted(os.listdir(tmp_path)) == sorted([taken, other] if there else [taken])
+    assert not there or (tmp_path / other).read_text() == "old"
+    assert (tmp_path / taken / "of_others").is_dir()
 
 
 def test_a_full_disk_is_one_line_that_names_the_file(tmp_path):

@@ -213,3 +213,32 @@ def test_blank_lines_and_what_is_not_a_number_in_text(folder):
     content = ply([vertices(np.array([[1, 2, 3], [4, 5, 6.5], [7, 8, 9]])), faces(1)], text=True)
     content = content.replace(b"6.5", b"-nan(ind)\n \n").replace(b"7 8", b"1.#QNAN 8")
     np.testing.assert_array_equal(read_points(written(folder, content)), [[1, 2, 3], [4, 5, np.nan], [np.nan, 8, 9]])
+
+
+def in_text(properties, rows):
+    names = "".join(f"property {kind} {name}\n" for name, kind in properties.items())
+    return f"ply\nformat ascii 1.0\nelement vertex {len(rows)}\n{names}end_header\n".encode() + "\n".join(rows).encode()
+
+
+def test_all_digits_in_text_count_whatever_the_header_declares(folder):
+    kinds = dict(x="float", y="float", z="float", depth="float")
+    points, attributes = read_scan(written(folder, in_text(kinds, ["512345.6781 5400000.1234 300.25 0.1"])))
+    assert points.tolist() == [[512345.6781, 5400000.1234, 300.25]]
+    assert (attributes["depth"].dtype, attributes["depth"][0]) == (np.float32, np.float32(0.1))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("kind", "cell", "held"),
+    [
+        *(("uchar", "255.0", np.uint8), ("uchar", "300", None), ("char", "-129", None), ("uint", "-1", None)),
+        *(("int", "2.5", None), ("float", "1e39", None), ("float", "inf", np.float32), ("short", "nan", None)),
+    ],
+)
+def test_what_a_declared_type_does_not_hold_stays_what_it_is(folder, kind, cell, held):
+    row = f"1 2 3 {cell}"
+    kinds = dict(x="int", y="int", z="int", further=kind)
+    points, attributes = read_scan(written(folder, in_text(kinds, [row])))
+    assert points.tolist() == [[1, 2, 3]]
+    assert attributes["further"].dtype == (held or np.float64)
+    np.testing.assert_array_equal(attributes["further"], [float(cell)])

@@ -113,6 +113,26 @@ def test_many_columns_of_other_names_are_refused(folder):
     assert read_points(three).tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
+@pytest.mark.parametrize("head", ["id,x,y", "x,y,intensity", "z,x,height", "nx,ny,nz", "Red,Green,Blue", "R G B"])
+def test_three_columns_that_are_named_as_other_things_are_refused(folder, head):
+    text = f"{head}\n1.5{' ' if ' ' in head else ','}2{' ' if ' ' in head else ','}3\n"
+    assert "has 3 columns, named" in refusal(folder, "named.csv", text)
+
+
+@pytest.mark.parametrize(
+    ("text", "points"),
+    [
+        ("0,1,2\n1.5,2,3\n4,5,6\n", [[1.5, 2, 3], [4, 5, 6]]),
+        ("0,1,2,3\n1.5,2,3,7\n", [[1.5, 2, 3]]),
+        ("0,1,2\n3,4,5\n", [[0, 1, 2], [3, 4, 5]]),
+        ("0 1 2\n1.5 2 3\n", [[0, 1, 2], [1.5, 2, 3]]),
+        ("0,1,2\n", [[0, 1, 2]]),
+    ],
+)
+def test_a_row_that_numbers_the_columns_is_no_point(folder, text, points):
+    assert read_points(written(folder, "numbered.csv", text)).tolist() == points
+
+
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [

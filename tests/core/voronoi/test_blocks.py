@@ -51,3 +51,24 @@ def test_crowded_blocks_stay_together(small):
 def test_cancels(small):
     with pytest.raises(Cancelled):
         overlapping_blocks(shapes.square(500), np.full(500, 0.1), lambda fraction, _: False)
+
+
+@pytest.mark.parametrize("kind", ["skew", "rings", "knot"])
+def test_lines_are_in_blocks_so_small_that_their_diagrams_are(kind):
+    """Of lines that are skew to each other a diagram has as many tetrahedra as the square of their points."""
+    t = np.linspace(0, 2 * np.pi, 4000, endpoint=False)
+    if kind == "skew":
+        points = np.concatenate([np.stack([t, 0 * t, 0 * t], axis=1), np.stack([0 * t + 3, t - 3, 0 * t + 3], axis=1)])
+    elif kind == "rings":
+        ring = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+        points = np.concatenate([ring, ring[:, [0, 2, 1]] + [1, 0, 0]])
+    else:
+        points = np.stack([np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)], axis=1)
+    spacing = np.linalg.norm(points[1] - points[0])
+    found = overlapping_blocks(points, np.full(len(points), 6 * spacing))
+    np.testing.assert_array_equal(np.sort(np.concatenate([block.own for block in found])), np.arange(len(points)))
+    assert max(len(block.members) for block in found) <= 500
+
+
+def test_a_sheet_is_not_cut_up_further():
+    assert len(overlapping_blocks(shapes.sphere(2000), np.full(2000, 0.4))) == 1
