@@ -32,19 +32,17 @@ _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name
 _POISSON_NODE = 40e-6  # MiB
 _CORE = 15.0  # MiB that each core beyond two holds in chunks
 
-# Processor seconds where the probe takes _PROBE of them; fitted to the same runs, which took .55 to 1.75 times as much,
-# nine tenths of them .7 to 1.5. The share of samples where sheets run close counts as fitted to 219 other shapes at a
-# resolution of 128, half of them with such sheets: nine tenths took .6 to 2.1 times as much, without it .8 to 4.2.
-_FIXED, _SAMPLE, _NOISY_SAMPLE = 0.37, 1.3e-4, 1.5e-4
-_NEAR_NODE, _NODE, _BAND_NEAR_NODE = 4.3e-6, 6.3e-8, 1.26e-5
-_MESHES = 3.7e-5  # for a squared cell of the surface
-_BAND_NEAR = 3.7, 1 / 8  # cells from the surface in a band, where all nodes are projected, and the share of others
-_CROWDED = {"none": 0.0, "double": 1.5, "single": 2.5, "both": 2.5, "signed": 2.5}  # times the work, by that share
+# Processor seconds where the probe takes _PROBE of them; fitted to 234 runs over 100 to 200,000 samples at resolutions
+# of 64 to 384, nine tenths of which took .67 to 2.9 times as much, most of the others slices and torn shapes. The field
+# is worked out at the nodes next to the surface, as many for each squared cell of it however far its samples are apart;
+# in a band at more of them.
+_FIXED, _SAMPLE, _NOISY_SAMPLE, _NODE = 0.35, 1.0e-4, 1.5e-4, 1.0e-7
+_FIELD, _BAND_FIELD, _MESHES = 1.4e-5, 6.5e-5, 2.2e-5  # for a squared cell of the surface
+_CROWDED = {"none": 0.0, "double": 1.0, "single": 1.7, "both": 1.7, "signed": 1.7}  # times the work, by that share
 _LOOKED_AT, _NEIGHBOURS = 500, 24  # samples, and those nearest to each
 _OFF = 0.25  # local spacings, that these are off the quadric through them where sheets run close
 _PROBE = 0.0045
 _CORES = 0.9  # seconds by the clock for one of the processor, where two cores or more are free
-_NEAR = 0.5  # cells from the surface, besides a spacing, up to which nodes are projected onto it
 
 
 @dataclass(frozen=True)
@@ -65,18 +63,12 @@ def estimate_cost(
 
     crowded : share of the samples where sheets run close, see :func:`crowded_share`; counts for clean ones alone
 
-    The area of the surface, which is about the sum of the squared spacings, tells how many nodes lie near it.
+    The area of the surface, about the sum of the squared spacings, tells how many nodes lie near it.
     """
     cells, nodes = spacing / grid.spacing, float(np.prod(grid.shape))
     area = float(np.sum(cells**2))
     work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing) + area * _MESHES * (settings.surface != "none")
-    if settings.band is None:
-        near = min(nodes, 2.0 * float(np.sum(cells**2 * (_NEAR + cells))))
-        work += _NEAR_NODE * near + _NODE * nodes
-    else:
-        width, share = _BAND_NEAR
-        near = min(nodes, 2.0 * float(np.sum(cells**2 * (width + share * (_NEAR + cells)))))
-        work += _BAND_NEAR_NODE * near
+    work += area * _FIELD + nodes * _NODE if settings.band is None else area * _BAND_FIELD
     work *= 1 + _CROWDED[settings.surface] * crowded * (not noisy)
     probe, busy = _probe()
     cpu = work * probe / _PROBE
