@@ -43,6 +43,8 @@ def deliver(
     if collection is not None and results.are_edited(results.all_of(collection)):
         warnings.append(f"{collection.name} is being edited and stays as it is: the new results are beside it")
         collection = None
+    if collection is not None:
+        results.drop_deleted(collection)
     known = results.member(collection, results.FIELD) if collection is not None else None
     stands = known is not None and outcome.volume == volume_files.file_of(known.data)
     if stands:

@@ -63,6 +63,15 @@ def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
     collection[MEMBERS] = {role(one): one for one in (*members(collection), obj)}
 
 
+def drop_deleted(collection: bpy.types.Collection) -> None:
+    """Remove the results of a run that were deleted and are kept for it alone: new ones are to have their names."""
+    for wanted, obj in [*(collection.get(MEMBERS) or {}).items()]:
+        if obj is not None and not obj.users_collection and not obj.use_fake_user:
+            del collection[MEMBERS][wanted]
+            unused = [obj.data] if obj.data is not None and obj.data.users == 1 else []
+            bpy.data.batch_remove([obj, *unused])
+
+
 def run_of(obj: bpy.types.Object) -> bpy.types.Collection | None:
     """The collection of the run that `obj` is a result of, or that the result is of which it follows, wherever it was
     moved; else the one that it is in."""

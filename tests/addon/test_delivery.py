@@ -788,6 +788,15 @@ def test_a_copy_of_a_result_can_be_reconstructed_itself(blender, run, scan, exte
     assert chosen(blender.context) == collection
 
 
+@pytest.mark.parametrize("role", ["surface", "samples", "field"])
+def test_a_result_that_was_deleted_comes_back_under_its_name(blender, run, scan, role):
+    make_active(blender, run()[role])
+    blender.ops.object.delete()
+    make_active(blender, scan)
+    obj = run()[role]
+    assert (obj.name, obj.data.name) == (f"Scan {role}",) * 2
+
+
 def test_a_copy_of_a_result_is_the_users_though_the_result_was_deleted(blender, folder, run, scan, extension):
     surface = run()["surface"]
     make_active(blender, surface)
