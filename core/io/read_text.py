@@ -28,11 +28,17 @@ def read_text(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     try:
         points, attributes, _ = _read(path)
     except InputError:
-        points, attributes, further = _read(path, ())
-        for name in further:
-            with suppress(InputError):
-                attributes |= _read(path, (name,))[1]
+        points, _, further = _read(path, ())
+        attributes = _readable(path, further)
     return points, with_colours_in_bytes(attributes)
+
+
+def _readable(path, names):
+    """Those of the columns of some names that have a number in each row, looked for in ever smaller halves."""
+    with suppress(InputError):
+        return _read(path, names)[1] if names else {}
+    middle = len(names) // 2
+    return _readable(path, names[:middle]) | _readable(path, names[middle:]) if middle else {}
 
 
 def read_obj(path: Path) -> np.ndarray:
