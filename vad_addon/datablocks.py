@@ -9,6 +9,8 @@ import numpy as np
 from . import volume_files
 from .attributes import Attribute, write
 
+_OF_TOOLS = "remesh_", "use_remesh_", "use_mirror_", "radial_symmetry"  # settings of meshes
+
 
 def mesh_data(name: str, vertices, kinds, origin, attributes: dict[str, Attribute]) -> bpy.types.Mesh:
     """A mesh, shaded smooth as all new ones are: (v,3) `vertices` relative to `origin`, and its faces, an array (f,k)
@@ -55,9 +57,11 @@ def volume_data(name: str, path: Path, active: str) -> bpy.types.Volume:
 
 def replace_data(old: bpy.types.ID, new: bpy.types.ID) -> None:
     """Put `new` wherever `old` is used, under its name and with its materials, custom properties and animation, flat
-    where it was, and remove `old`."""
+    where it was, to be remeshed and mirrored alike, and remove `old`."""
     for material in old.materials:
         new.materials.append(material)
+    for name in filter(lambda name: name.startswith(_OF_TOOLS), old.bl_rna.properties.keys()):
+        setattr(new, name, getattr(old, name))
     for name, value in old.items():
         new[name] = value.to_dict() if hasattr(value, "to_dict") else value
         with suppress(TypeError):  # not all can have limits and a tooltip

@@ -225,6 +225,7 @@ def test_materials_modifiers_and_places_survive(blender, run, scan):
         obj.data.materials.append(blender.data.materials.new(f"My {obj.name}"))
     made["surface"].modifiers.new("Mine", "SMOOTH")
     made["surface"].location.x += 3
+    made["surface"].data.use_mirror_x, made["surface"].data.remesh_voxel_size = True, 0.25
     made["field"].data.display.density *= 2
     duplicate = blender.data.objects.new("Linked duplicate", made["surface"].data)
     display = made["field"].data.display.density
@@ -232,6 +233,7 @@ def test_materials_modifiers_and_places_survive(blender, run, scan):
     for obj in made.values():
         assert obj.data.materials[-1].name == f"My {obj.name}"
     assert "Mine" in made["surface"].modifiers
+    assert (made["surface"].data.use_mirror_x, made["surface"].data.remesh_voxel_size) == (True, 0.25)
     assert made["surface"].location.x == pytest.approx(3, abs=1e-3)
     assert made["field"].data.display.density == pytest.approx(2 * display, rel=0.05)  # half the cell, twice as dense
     assert duplicate.data == made["surface"].data
