@@ -39,9 +39,8 @@ def _take_places(waiting):
         for _, path in reversed(waiting):
             if path.is_file():
                 with _errors_of(path):
-                    old = _beside(path)
-                    os.replace(path, old)
-                    before.append((old, path))
+                    before.append((_beside(path), path))
+                    os.replace(path, before[-1][0])
         for temporary, path in waiting:
             with _errors_of(path):
                 os.replace(temporary, path)

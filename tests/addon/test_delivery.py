@@ -799,6 +799,16 @@ def test_a_result_that_was_deleted_comes_back_under_its_name(blender, run, scan,
     assert (obj.name, obj.data.name) == (f"Scan {role}",) * 2
 
 
+def test_a_result_that_was_taken_out_and_is_used_stays_for_its_user(blender, run, scan, add_mesh, sphere):
+    surface = run()["surface"]
+    wrapped = add_mesh("Wrapped", sphere).modifiers.new("Wrap", "SHRINKWRAP")
+    wrapped.target = surface
+    surface.users_collection[0].objects.unlink(surface)
+    make_active(blender, scan)
+    run()
+    assert wrapped.target == surface
+
+
 def test_a_copy_of_a_result_is_the_users_though_the_result_was_deleted(blender, folder, run, scan, extension):
     surface = run()["surface"]
     make_active(blender, surface)
