@@ -173,9 +173,10 @@ class Settings:
         for option in dataclasses.fields(self):
             object.__setattr__(self, option.name, _checked(option, getattr(self, option.name)))
         if self.band is None and self.resolution > WHOLE_BOX:
+            banded = "set band, for instance to 4," + " and integration to transport," * (self.integration == "poisson")
             raise SettingsError(
-                f"resolution is {self.resolution} and the whole box may have {WHOLE_BOX} cells at most; set band, for "
-                "instance to 4, or lower the resolution"
+                f"resolution is {self.resolution} and the whole box may have {WHOLE_BOX} cells at most; {banded} or "
+                "lower the resolution"
             )
         if self.band is not None and self.integration == "poisson":
             raise SettingsError(

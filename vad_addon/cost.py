@@ -119,8 +119,9 @@ class VAD_OT_use_resolution(bpy.types.Operator):
 
     def execute(self, context):
         stored = context.scene.vad
-        stored.resolution = suits()
-        if suits() > WHOLE_BOX and stored.band == "none" and stored.integration == "transport":
+        in_box = stored.integration == "poisson"  # which has no band
+        stored.resolution = min(suits(), WHOLE_BOX) if in_box else suits()
+        if suits() > WHOLE_BOX and stored.band == "none" and not in_box:
             stored.band = f"{advised_band(stored.offset):g}"
         return {"FINISHED"}
 

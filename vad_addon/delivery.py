@@ -59,7 +59,7 @@ def deliver(
         rollback.pop_all()
     before, mesh = set(results.members(collection)), results.mesh(collection)
     for changed in (obj for obj in before if results.MADE in obj and _is_changed(obj)):
-        if results.is_shown_otherwise(changed):
+        if results.is_shown_by_others(changed, copies=False):
             changed.data = changed.data.copy()  # the other stays as it is
         else:
             warnings.append(_set_aside(scene, changed))
@@ -78,7 +78,8 @@ def deliver(
     collection.pop(results.FIELD_OF, None)
     if stands or results.FIELD in made:
         made_from = overlay.samples_of(made[results.SAMPLES])[:3]
-        collection[results.FIELD_OF] = stored_field.identity(*made_from, json.loads(outcome.report)["settings"])
+        path = volume_files.file_of(results.member(collection, results.FIELD).data)
+        collection[results.FIELD_OF] = stored_field.identity(path, *made_from, json.loads(outcome.report)["settings"])
     elif known is not None:
         warnings.append(f"{known.name} is out of date: it stays as an earlier run left it")
     collection[results.REPORT] = outcome.report
@@ -167,6 +168,8 @@ def _place(collection, role, data, origin, turned):
         obj[results.ROLE] = role
         collection.objects.link(obj)
     elif role == results.FIELD:
+        if materials.CELL not in obj.data or results.is_shown_by_others(obj):
+            obj.data = obj.data.copy()  # a volume of the user's, or kept by a copy, stays as it is
         datablocks.replace_volume(obj.data, data)
     else:
         was_moved = moved_within(obj)

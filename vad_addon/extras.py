@@ -5,7 +5,7 @@ import numpy as np
 from mathutils import Vector
 
 from ..core.errors import InputError, VADError
-from . import axes, points_in, results, shapes
+from . import axes, points_in, results, shapes, volume_files
 
 
 def chosen_result(context: bpy.types.Context) -> bpy.types.Collection | None:
@@ -55,11 +55,11 @@ class _OfResult:
 
     def execute(self, context):
         try:
-            results.leave_modes(context)
             obj = self.make(chosen_result(context))
         except VADError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        results.leave_modes(context)
         for other in context.selected_objects:
             other.select_set(False)
         context.view_layer.objects.active = obj
@@ -164,11 +164,18 @@ class VAD_OT_show(bpy.types.Operator):
         for obj in objects:
             results.show(context.scene, obj, shown)
         for obj in objects:
-            if problem := results.unseen(obj):
+            if problem := results.unseen(obj) or (shown and _without_file(obj)):
                 self.report({"WARNING"}, problem)
             if obj.library is not None:
                 self.report({"WARNING"}, f"{obj.name} is linked: whether renders show it is set in its own file")
         return {"FINISHED"}
+
+
+def _without_file(obj):
+    """What to say of a field that shows nothing, as its file is gone; empty of any other object."""
+    if obj.type != "VOLUME" or obj.data.packed_file is not None or volume_files.file_of(obj.data).is_file():
+        return ""
+    return shapes.unreadable(obj)
 
 
 class _OfEditedMesh:

@@ -34,9 +34,13 @@ CLASSES = (
     importer.VAD_FH_points,
     *panel.CLASSES,
 )
-_NEW_DATA = bpy.app.handlers.load_post, bpy.app.handlers.undo_post, bpy.app.handlers.redo_post
-_NEW_SCENES = bpy.app.handlers.load_post, bpy.app.handlers.depsgraph_update_post
-_SAVES = (
+_HANDLERS = (
+    (bpy.app.handlers.load_post, preferences.prepare_scenes),
+    (bpy.app.handlers.depsgraph_update_post, preferences.prepare_scenes),
+    (bpy.app.handlers.load_post, volume_files.delete_unused),
+    (bpy.app.handlers.load_post, overlay.on_new_data),
+    (bpy.app.handlers.undo_post, overlay.on_new_data),
+    (bpy.app.handlers.redo_post, overlay.on_new_data),
     (bpy.app.handlers.save_pre, results.forget_deleted),
     (bpy.app.handlers.save_pre, volume_files.bring_along),
     (bpy.app.handlers.save_post, volume_files.keep_saved),
@@ -50,13 +54,8 @@ def register():
     bpy.types.Scene.vad = bpy.props.PointerProperty(type=properties.VAD_PG_scene)
     bpy.types.TOPBAR_MT_file_import.append(importer.draw_menu)
     presets.register()
-    for handlers in _NEW_SCENES:
-        handlers.append(preferences.prepare_scenes)
-    bpy.app.handlers.load_post.append(volume_files.delete_unused)
-    for handlers, handler in _SAVES:
+    for handlers, handler in _HANDLERS:
         handlers.append(handler)
-    for handlers in _NEW_DATA:
-        handlers.append(overlay.on_new_data)
     bpy.app.timers.register(overlay.sync)  # scenes that show normals: they cannot be looked at while this runs
 
 
@@ -65,13 +64,9 @@ def unregister():
     if bpy.app.timers.is_registered(overlay.sync):
         bpy.app.timers.unregister(overlay.sync)
     overlay.remove()
-    for handlers in _NEW_DATA:
-        handlers.remove(overlay.on_new_data)
-    for handlers, handler in _SAVES:
-        handlers.remove(handler)
-    bpy.app.handlers.load_post.remove(volume_files.delete_unused)
-    for handlers in _NEW_SCENES:
-        handlers.remove(preferences.prepare_scenes)
+    for handlers, handler in _HANDLERS:
+        if handler in handlers:  # scripts may have cleared them
+            handlers.remove(handler)
     volume_files.delete_unused_at_exit()
     presets.unregister()
     bpy.types.TOPBAR_MT_file_import.remove(importer.draw_menu)

@@ -99,8 +99,9 @@ def remove() -> None:
     _batches.clear()
     if _handle is not None:
         bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        bpy.app.handlers.depsgraph_update_post.remove(_geometry_changed)
         _handle = None
+        if _geometry_changed in bpy.app.handlers.depsgraph_update_post:  # scripts may have cleared them
+            bpy.app.handlers.depsgraph_update_post.remove(_geometry_changed)
         _redraw()
 
 

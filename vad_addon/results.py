@@ -66,7 +66,7 @@ def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
 def drop_deleted(collection: bpy.types.Collection) -> None:
     """Remove the results of a run that were deleted and are kept for it alone: new ones are to have their names."""
     for wanted, obj in [*(collection.get(MEMBERS) or {}).items()]:
-        if obj is not None and obj.users == 1 and not obj.users_collection:
+        if obj is not None and bpy.data.user_map(subset=[obj])[obj] <= {collection}:
             del collection[MEMBERS][wanted]
             unused = [obj.data] if obj.data is not None and obj.data.users == 1 else []
             bpy.data.batch_remove([obj, *unused])
@@ -190,9 +190,10 @@ def _is_own(obj):
     return is_editable(obj) and (obj.data is None or is_editable(obj.data))
 
 
-def is_shown_otherwise(obj: bpy.types.Object) -> bool:
-    """Whether an object of the user's shows the same data as the result `obj`; copies of results are none such."""
-    return any(other.data == obj.data and ROLE not in other for other in bpy.data.objects)
+def is_shown_by_others(obj: bpy.types.Object, copies: bool = True) -> bool:
+    """Whether other objects show the same data as the result `obj`, `copies` of results among them or not."""
+    others = (other for other in bpy.data.objects if other.data == obj.data and other != obj)
+    return any(copies or ROLE not in other for other in others)
 
 
 def are_edited(objects: list[bpy.types.Object]) -> bool:

@@ -46,6 +46,8 @@ def normals(collection: bpy.types.Collection, length: float, thickness: float, e
     if samples is None:
         raise InputError(f"{collection.name} has no samples any more: reconstruct again")
     points, axes, _, radius = overlay.samples_of(samples.data)
+    if not len(points):
+        raise InputError(f"{samples.name} has no points any more: reconstruct again")
     ends, rows = overlay.segments(points, axes, 0.5 * length * radius, every, len(points))
     curves = bpy.data.hair_curves.new(f"{samples.name} normals")
     curves.add_curves([2] * len(rows))
@@ -75,8 +77,15 @@ def _field(collection):
     if _distances(field) is None:
         if field.data.packed_file is not None:
             raise InputError(f"{field.name} is packed: press File > External Data > Unpack Resources, then try again")
-        raise InputError(f"{field.name} cannot be read from {volume_files.file_of(field.data)}: reconstruct again")
+        raise InputError(unreadable(field))
+    if materials.CELL not in field.data:
+        raise InputError(f"{field.name} shows another volume than its own: reconstruct again")
     return field
+
+
+def unreadable(field: bpy.types.Object) -> str:
+    """What to say of a field whose file cannot be read."""
+    return f"{field.name} cannot be read from {volume_files.file_of(field.data)}: reconstruct again"
 
 
 def _distances(field):

@@ -45,7 +45,6 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         stored = context.scene.vad
         if not self.properties.is_property_set("strength") and settings_from(stored).denoise not in {"auto", 0.0}:
             self.strength = settings_from(stored).denoise
-        results.leave_modes(context)  # else the copy could not become the active object
         outliers = taken_over(stored, self.properties, ["outliers"])
         settings = settings_from(stored, denoise=self.strength, **outliers)
         return Task(self._source.points, settings, until=CLEANING)
@@ -61,6 +60,8 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
             carried[AXIS] = Attribute.of(axes[rows])
         cloud = datablocks.pointcloud_data(f"{source.name} cleaned", found.points, found.origin, carried)
         obj = _placed(context, scene, source, cloud, found.origin)
+        if points_in.active_object(context) in points_in.objects_of(source):
+            results.leave_modes(context)  # else the copy could not become the active object
         results.take_the_stage(context, obj, source.uids)
         for warning in source.warnings:
             self.report({"WARNING"}, warning)
@@ -153,10 +154,10 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         self._source = Source(name, uids, points, carried, None)
         self._collection = collection.session_uid if results.can_be_updated(collection) else None
         field, volume = results.member(collection, results.FIELD), None
-        same = collection.get(results.FIELD_OF) == stored_field.identity(near, axes, confidence, asdict(settings))
-        if field is not None and same and stored_field.suffices(settings):
-            volume = volume_files.file_of(field.data)
-            volume = volume if volume.is_file() else None
+        if field is not None and stored_field.suffices(settings):
+            path = volume_files.file_of(field.data)
+            now = stored_field.identity(path, near, axes, confidence, asdict(settings))
+            volume = path if now == collection.get(results.FIELD_OF) else None
         return Task(points, settings, known=(axes, confidence), origin=centre, volume=volume)
 
     def deliver(self, context, scene, found):

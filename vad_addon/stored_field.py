@@ -15,10 +15,13 @@ from ..core.settings import Settings
 _MAKE_THE_FIELD = "resolution", "band", "bridge", "integration", "diffusion"  # of the settings
 
 
-def identity(points: np.ndarray, normals: np.ndarray, confidence: np.ndarray, settings: dict) -> str:
+def identity(path: Path, points: np.ndarray, normals: np.ndarray, confidence: np.ndarray, settings: dict) -> str | None:
     """A text that is the same for samples (n,3), their normals (n,3) and confidence (n,) that give the same field with
-    these settings, by name."""
-    digest = hashlib.sha256(json.dumps([settings[name] for name in _MAKE_THE_FIELD]).encode())
+    these settings, by name, and for a file at `path` as large as before: another may have taken its name. None where
+    there is none."""
+    if not path.is_file():
+        return None
+    digest = hashlib.sha256(json.dumps([path.stat().st_size, *(settings[name] for name in _MAKE_THE_FIELD)]).encode())
     for values in (points, normals, confidence):
         digest.update(np.ascontiguousarray(values, np.float32).tobytes())
     return digest.hexdigest()

@@ -57,7 +57,7 @@ def file_of(volume: bpy.types.Volume) -> Path:
 
 @persistent
 def bring_along(blend: str = "", *_) -> None:
-    """Before the file `blend` is saved (none: the startup file): what its volumes read in the cache folder is copied
+    """Before the file `blend` is saved (none: the startup file): what its volumes read in a cache folder is copied
     beside it, and they read the copies from then on. Where that fails they go on reading the cache folder, and the
     results say so."""
     _before.clear()
@@ -67,7 +67,8 @@ def bring_along(blend: str = "", *_) -> None:
     here = bpy.data.is_saved and Path(bpy.data.filepath).parent == folder.parent
     for volume in bpy.data.volumes:
         path = file_of(volume)
-        if volume.library is not None or caches.isdisjoint(path.parents) or not path.is_file():
+        cached = path.parent.name == _SUBFOLDER or not caches.isdisjoint(path.parents)
+        if volume.library is not None or not cached or not path.is_file():
             continue
         try:
             copy = _copy(path, folder)

@@ -58,6 +58,7 @@ def _torch():
         import torch
     except ImportError as error:
         raise MissingDependency(
-            f'backend is "torch", which is not installed; run "{sys.executable}" -m pip install torch, or use "numpy"'
+            f'torch is not installed; run "{sys.executable}" -m pip install torch, or use backend "numpy" and device '
+            '"cpu"'
         ) from error
     return torch

@@ -809,6 +809,15 @@ def test_a_result_that_was_taken_out_and_is_used_stays_for_its_user(blender, run
     assert wrapped.target == surface
 
 
+def test_a_copy_of_the_field_goes_on_showing_what_it_did(blender, run, scan):
+    """Blender's copies of objects share their volumes."""
+    field = run()["field"]
+    copy = field.copy()
+    blender.context.scene.collection.objects.link(copy)
+    path = copy.data.filepath
+    assert run(resolution=16)["field"].data.filepath != path == copy.data.filepath
+
+
 def test_a_copy_of_a_result_is_the_users_though_the_result_was_deleted(blender, folder, run, scan, extension):
     surface = run()["surface"]
     make_active(blender, surface)

@@ -384,3 +384,42 @@ def test_fixed_axes_hold_in_the_run_and_live_in_the_file(blender, tmp_path, edit
 def test_outside_edit_mode_they_say_what_to_do(blender, scan):
     with pytest.raises(RuntimeError, match="Enter edit mode of a mesh and select the points whose axis you know"):
         blender.ops.vad.fix_axes()
+
+
+def test_normals_of_no_points_are_refused(blender, result):
+    result["samples"].data = blender.data.pointclouds.new("Empty")
+    with pytest.raises(RuntimeError, match="has no points any more: reconstruct again"):
+        blender.ops.vad.normals_to_geometry()
+
+
+def test_a_volume_of_the_users_is_told_and_stays(blender, result):
+    theirs = blender.data.volumes.new("Smoke")
+    theirs.filepath = result["field"].data.filepath
+    result["field"].data = theirs
+    before = set(blender.data.objects), theirs.filepath
+    for operator in (blender.ops.vad.shell, blender.ops.vad.slice):
+        with pytest.raises(RuntimeError, match="shows another volume than its own: reconstruct again"):
+            operator()
+    assert (set(blender.data.objects), theirs.filepath) == before
+    blender.ops.vad.reconstruct(resolution=16)
+    assert theirs.filepath == before[1] != result["field"].data.filepath
+
+
+def test_a_field_whose_file_is_gone_is_told_when_it_is_shown(blender, result, extension, capfd):
+    extension("vad_addon.volume_files").file_of(result["field"].data).unlink()
+    result["field"].hide_set(True)
+    blender.ops.vad.show(role="field")
+    assert "cannot be read from" in capfd.readouterr().out
+
+
+def test_who_is_refused_stays_in_edit_mode(blender, result):
+    scan = blender.data.objects["Scan"]
+    blender.context.view_layer.objects.active = scan
+    blender.ops.object.mode_set(mode="EDIT")
+    blender.data.objects.remove(result["field"])
+    blender.ops.mesh.select_all(action="DESELECT")
+    for operator in (blender.ops.vad.shell, blender.ops.vad.denoise):
+        blender.context.scene.vad.selected_only = True
+        with pytest.raises(RuntimeError):
+            operator()
+        assert scan.mode == "EDIT"

@@ -21,6 +21,17 @@ def test_registering_twice_leaves_nothing_behind(empty, extension):
         assert shown(empty) == set()
 
 
+def test_it_can_be_disabled_where_a_script_cleared_the_handlers(empty, extension):
+    vad_addon, before = extension("vad_addon"), len(empty.app.handlers.load_post)
+    for _ in range(2):
+        vad_addon.register()
+        for handlers in (empty.app.handlers.load_post, empty.app.handlers.depsgraph_update_post):
+            handlers.clear()
+        vad_addon.unregister()
+        assert not hasattr(empty.types.Scene, "vad")
+    assert len(empty.app.handlers.load_post) <= before
+
+
 def test_every_operator_and_every_choice_says_what_it_does(blender, extension):
     shown = [cls for cls in extension("vad_addon.interface").CLASSES if not issubclass(cls, blender.types.Panel)]
     operators = [cls for cls in shown if issubclass(cls, blender.types.Operator)]

@@ -1,5 +1,6 @@
 """Volumes that nothing can read any more do not pile up; every other one stays."""
 
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -104,6 +105,16 @@ def test_a_save_brings_the_volumes_of_an_unsaved_file_along(blender, unsaved, tm
     blender.ops.wm.open_mainfile(filepath=str(tmp_path / "elsewhere" / "scene.blend"))
     assert not cached.exists()
     assert blender.data.volumes["Scan field"].grids.load()
+
+
+def test_what_lies_in_the_cache_folder_of_before_comes_along(blender, unsaved, tmp_path):
+    before = tmp_path / "before" / "vad_cache" / "Scan.vdb"
+    before.parent.mkdir(parents=True)
+    shutil.copyfile(unsaved.filepath, before)
+    unsaved.filepath = str(before)
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    assert unsaved.grids.load()
 
 
 def test_what_undo_brings_back_from_the_cache_comes_along_again(blender, unsaved, tmp_path):
