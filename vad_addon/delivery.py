@@ -239,7 +239,8 @@ def moved_within(obj: bpy.types.Object) -> bool:
 
 
 def _box(data):
-    points = attributes.values(data.attributes["position"])
+    place = data.attributes.get("position")  # which an empty point cloud may lack
+    points = attributes.values(place) if place else ()
     ends = (points.min(axis=0), points.max(axis=0)) if len(points) else ()
     return [float(len(points)), *(float(x) for end in ends for x in end)]
 

@@ -130,7 +130,8 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         collection = extras.chosen_result(context)
         if collection is None:
             return extras.no_results(context)
-        if results.member(collection, results.SAMPLES) is None:
+        samples = results.member(collection, results.SAMPLES)
+        if samples is None or not samples.data.attributes.domain_size("POINT"):
             return f"{collection.name} has no samples any more: reconstruct again"
         return ""
 

@@ -390,6 +390,10 @@ def test_normals_of_no_points_are_refused(blender, result):
     result["samples"].data = blender.data.pointclouds.new("Empty")
     with pytest.raises(RuntimeError, match="has no points any more: reconstruct again"):
         blender.ops.vad.normals_to_geometry()
+    with pytest.raises(RuntimeError, match="has no samples any more: reconstruct again"):
+        blender.ops.vad.reextract()
+    blender.ops.vad.reconstruct(resolution=16)
+    assert result["samples"].data.attributes.domain_size("POINT") == 500
 
 
 def test_a_volume_of_the_users_is_told_and_stays(blender, result):
