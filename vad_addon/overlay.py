@@ -175,7 +175,8 @@ def _draw():
 
 def _shown(visible):
     """The visible objects, and the samples of each run of which anything is visible: they may be hidden themselves."""
-    runs = {results.run_of(obj) for obj in visible if results.role(obj)} - {None}
+    held = results.held()
+    runs = {held.get(obj) or results.run_of(obj) for obj in visible if results.role(obj)} - {None}
     samples = filter(None, (results.member(run, results.SAMPLES) for run in runs))
     return {*visible, *samples}
 

@@ -51,8 +51,10 @@ def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
     what the first was made from, so that a run can be repeated with its results at hand. Copies of results count as
     any object does."""
     chosen = _chosen(context)
-    readable = (obj for obj in chosen if obj.type in READABLE)
-    if scans := [obj for obj in readable if results.role(obj) is None or results.is_copy(obj)]:
+    readable = [obj for obj in chosen if obj.type in READABLE]
+    made = {obj for obj in readable if results.role(obj) is not None}
+    held = results.held() if len(made) > 1 else {}
+    if scans := [obj for obj in readable if obj not in made or (obj not in held and results.is_copy(obj))]:
         return scans
     origins = [source for obj in chosen[:1] for source in results.origins(obj, context.scene)]
     return [obj for obj in origins if obj.type in READABLE]

@@ -58,6 +58,11 @@ def all_of(collection: bpy.types.Collection) -> list[bpy.types.Object]:
     return [*members(collection), *(obj for obj in collection.objects if role(obj) is not None)]
 
 
+def held() -> dict[bpy.types.Object, bpy.types.Collection]:
+    """The results of all runs, each with its run's collection: for many objects quicker than :func:`run_of`."""
+    return {obj: run for run in bpy.data.collections if REPORT in run for obj in members(run)}
+
+
 def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
     """Make `obj` the one that plays its role in the results of a run."""
     collection[MEMBERS] = {role(one): one for one in (*members(collection), obj)}
