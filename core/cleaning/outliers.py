@@ -29,6 +29,7 @@ _LAYER, _FLAT = 7, 0.1  # of these, looked at together; thickness of such a shee
 _MANY_PROUD = 0.00125  # share of such samples above which they are strays: corners have some
 _COMPANY = 40  # sparse samples that vote whether they are strays
 _MAJORITY = 0.6
+_TURNS, _FLAT_PARTS, _LEAST = 3, 0.15, 0.2  # two sheets: times parted; thickness of the parts; least share in either
 _CHUNK = 8192  # samples
 
 _DIRTY, _LONE = 0.0005, 1  # share and number of strays above which those close to the surface are looked for, too
@@ -143,5 +144,24 @@ def _scattered(around, progress):
     for part in progress.chunks(len(sparse), _CHUNK):
         company = tree.query(points[part], k=k, workers=-1)[1].reshape(-1, k)
         mostly = astray[sparse[company]].mean(axis=1) > _MAJORITY
-        found[sparse[part]] = mostly & (thickness(points[company]) > SHEET)
+        around = points[company]
+        found[sparse[part]] = mostly & (thickness(around) > SHEET) & ~_are_two_sheets(around)
     return found
+
+
+def _are_two_sheets(groups):
+    """Whether the points of groups (m,k,3) lie in two sheets, as those of a thin wall do: parted midway across where
+    they extend least, each part is flat. Parted anew by the direction in which the parts extend least, a few times, as
+    walls hardly wider than their samples are apart extend as much one way as another."""
+    parts = groups - groups.mean(axis=1, keepdims=True)
+    for _ in range(_TURNS):
+        axes = np.linalg.eigh(np.einsum("mki,mkj->mij", parts, parts))[1]
+        height = np.einsum("mki,mi->mk", groups, axes[:, :, 0])
+        upper = height > 0.5 * (height.min(axis=1) + height.max(axis=1))[:, None]
+        share = upper.mean(axis=1)
+        for half in (upper, ~upper):
+            weight = half / np.maximum(half.sum(axis=1), 1)[:, None]
+            parts = np.where(half[:, :, None], groups - np.einsum("mk,mki->mi", weight, groups)[:, None], parts)
+    squared = np.linalg.eigvalsh(np.einsum("mki,mkj->mij", parts, parts))
+    flat = squared[:, 0] < _FLAT_PARTS**2 * squared.sum(axis=1)
+    return flat & (np.minimum(share, 1 - share) > _LEAST)

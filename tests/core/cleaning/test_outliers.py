@@ -305,3 +305,16 @@ def test_points_given_twice_are_looked_at_without_a_warning():
     strays = np.random.default_rng(0).uniform(-2, 2, (10, 3))
     once = np.concatenate([shapes.scattered_sphere(150), strays])
     assert not find_outliers(np.tile(once, (2, 1)))[:150].any()
+
+
+@pytest.mark.parametrize("gap", [0.08, 0.1, 0.12])
+def test_sparse_samples_of_a_thin_wall_are_no_strays(gap):
+    """A plate, dense on one side, whose two faces are about as far apart as its sparse samples are on the other."""
+    u, v = np.linspace(-1, 0, 100), np.arange(0.1, 1, 0.08)
+    dense, sparse = (
+        np.stack([*np.meshgrid(along, across), np.zeros((len(across), len(along)))], axis=-1).reshape(-1, 3)
+        for along, across in ((u, np.linspace(-0.5, 0.5, 100)), (v, np.arange(-0.5, 0.5, 0.08)))
+    )
+    sparse[:, :2] += np.random.default_rng(0).normal(scale=0.01, size=(len(sparse), 2))
+    faces = [dense, dense + np.array([0, 0, gap]), sparse, sparse + np.array([0.04, 0.04, gap])]
+    assert find_outliers(np.concatenate(faces)).sum() < 0.1 * 2 * len(sparse)
