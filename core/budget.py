@@ -3,6 +3,7 @@
 import sys
 import time
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -159,7 +160,8 @@ def _by_samples(settings):
     """MiB that normals take for any samples, and for each of them."""
     if settings.solver != "energy":
         return _MEMORY["diagram"], _MEMORY["sample"]
-    return _MEMORY["diagram"] + _ENERGY["torch"] * (settings.backend != "numpy"), _ENERGY["sample"]
+    with_torch = settings.backend == "torch" or (settings.backend == "auto" and find_spec("torch") is not None)
+    return _MEMORY["diagram"] + _ENERGY["torch"] * with_torch, _ENERGY["sample"]
 
 
 def _fitting_samples(limit, settings):

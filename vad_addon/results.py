@@ -71,7 +71,8 @@ def hold(collection: bpy.types.Collection, obj: bpy.types.Object) -> None:
 def drop_deleted(collection: bpy.types.Collection) -> None:
     """Remove the results of a run that were deleted and are kept for it alone: new ones are to have their names."""
     for wanted, obj in [*(collection.get(MEMBERS) or {}).items()]:
-        if obj is not None and bpy.data.user_map(subset=[obj])[obj] <= {collection}:
+        deleted = obj is not None and not obj.users_collection
+        if deleted and bpy.data.user_map(subset=[obj])[obj] <= {collection}:
             del collection[MEMBERS][wanted]
             unused = [obj.data] if obj.data is not None and obj.data.users == 1 else []
             bpy.data.batch_remove([obj, *unused])

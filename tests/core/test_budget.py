@@ -41,7 +41,7 @@ def test_more_points_and_finer_grids_cost_more():
         (10_000, "128, surface='both'"),
         (2000, "192, band=4"),
         (2000, "192, integration='poisson'"),
-        (6000, "64, solver='energy', backend='numpy'"),
+        (6000, "64, solver='energy'"),
     ],
 )
 def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
@@ -219,7 +219,7 @@ def test_no_points_are_advised_that_are_too_few():
             Estimate(1.0, 1000.0, 1.0),
             np.full(500, 0.1),
             grid,
-            Settings(resolution=16, memory_limit=64, solver="energy"),
+            Settings(resolution=16, memory_limit=64, solver="energy", backend="torch"),
         )
 
 
