@@ -158,7 +158,7 @@ class VAD_OT_reextract(run.Run, bpy.types.Operator):
         if field is not None and stored_field.suffices(settings):
             path = volume_files.file_of(field.data)
             now = stored_field.identity(path, near, axes, confidence, asdict(settings))
-            volume = path if now == collection.get(results.FIELD_OF) else None
+            volume = path if now is not None and now == collection.get(results.FIELD_OF) else None
         return Task(points, settings, known=(axes, confidence), origin=centre, volume=volume)
 
     def deliver(self, context, scene, found):

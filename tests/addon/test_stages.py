@@ -332,9 +332,14 @@ def test_another_field_is_made_where_the_samples_or_the_file_changed(blender, fo
     blender.ops.vad.reextract(resolution=24)
     assert len(whole_runs) == 3
     for path in (folder / "vad").iterdir():
-        path.write_text("another volume")
+        path.unlink()
+    del blender.context.scene.vad.result["vad_field_of"]
     blender.ops.vad.reextract(resolution=24)
     assert len(whole_runs) == 4
+    for path in (folder / "vad").iterdir():
+        path.write_text("another volume")
+    blender.ops.vad.reextract(resolution=24)
+    assert len(whole_runs) == 5
     for path in (folder / "vad").iterdir():
         path.write_bytes(bytes(path.stat().st_size))
     with pytest.raises(RuntimeError, match=r"cannot be read \(.*\): reconstruct again"):
