@@ -3,7 +3,6 @@
 import sys
 import time
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from .errors import MemoryBudgetError
 from .field.grid import Grid, fit_grid
 from .linalg import row_dots
 from .neighbourhoods.quadrics import nested_residuals
+from .normals.energy_torch import uses_torch
 from .parallel import cores
 from .points import MINIMUM_SAMPLES
 from .settings import BESIDE_OFFSET, Settings, options
@@ -160,8 +160,7 @@ def _by_samples(settings):
     """MiB that normals take for any samples, and for each of them."""
     if settings.solver != "energy":
         return _MEMORY["diagram"], _MEMORY["sample"]
-    with_torch = settings.backend == "torch" or (settings.backend == "auto" and find_spec("torch") is not None)
-    return _MEMORY["diagram"] + _ENERGY["torch"] * with_torch, _ENERGY["sample"]
+    return _MEMORY["diagram"] + _ENERGY["torch"] * uses_torch(settings), _ENERGY["sample"]
 
 
 def _fitting_samples(limit, settings):

@@ -64,7 +64,7 @@ def read(data) -> dict[str, Attribute]:
         for attribute in _own(data)
         if attribute.domain == "POINT" and attribute.data_type in _LAYOUT
     }
-    for attribute in filter(_is_of_corners, _own(data) if _has_faces(data) else ()):
+    for attribute in filter(_is_of_corners, _own(data)):
         found[attribute.name] = Attribute(attribute.data_type, _at_points(data, values(attribute)))
     return found
 
@@ -75,7 +75,7 @@ def left_out(data) -> list[str]:
     return [
         attribute.name
         for attribute in _own(data)
-        if not (_is_of_corners(attribute) and _has_faces(data))
+        if not _is_of_corners(attribute)
         and (attribute.domain, attribute.data_type) != ("CORNER", "FLOAT2")
         and (attribute.data_type not in _LAYOUT or attribute.domain != "POINT")
         and not (attribute.domain != "POINT" and attribute.name in _BLENDERS)
@@ -88,11 +88,8 @@ def _own(data):
 
 
 def _is_of_corners(attribute):
-    return attribute.domain == "CORNER" and attribute.data_type in _COLOURS
-
-
-def _has_faces(data):
-    return isinstance(data, bpy.types.Mesh) and len(data.loops) > 0
+    """Whether these are colours of corners, of which a mesh without faces has none."""
+    return attribute.domain == "CORNER" and attribute.data_type in _COLOURS and len(attribute.data) > 0
 
 
 def _at_points(mesh, of_corners):

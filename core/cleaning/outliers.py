@@ -144,8 +144,8 @@ def _scattered(around, progress):
     for part in progress.chunks(len(sparse), _CHUNK):
         company = tree.query(points[part], k=k, workers=-1)[1].reshape(-1, k)
         mostly = astray[sparse[company]].mean(axis=1) > _MAJORITY
-        around = points[company]
-        found[sparse[part]] = mostly & (thickness(around) > SHEET) & ~_are_two_sheets(around)
+        groups = points[company]
+        found[sparse[part]] = mostly & (thickness(groups) > SHEET) & ~_are_two_sheets(groups)
     return found
 
 
@@ -162,6 +162,4 @@ def _are_two_sheets(groups):
         for half in (upper, ~upper):
             weight = half / np.maximum(half.sum(axis=1), 1)[:, None]
             parts = np.where(half[:, :, None], groups - np.einsum("mk,mki->mi", weight, groups)[:, None], parts)
-    squared = np.linalg.eigvalsh(np.einsum("mki,mkj->mij", parts, parts))
-    flat = squared[:, 0] < _FLAT_PARTS**2 * squared.sum(axis=1)
-    return flat & (np.minimum(share, 1 - share) > _LEAST)
+    return (thickness(parts) < _FLAT_PARTS) & (np.minimum(share, 1 - share) > _LEAST)

@@ -1,11 +1,19 @@
 """The normal energy differentiated by torch, which is imported on the first call and never before."""
 
 import sys
+from importlib.util import find_spec
 
 import numpy as np
 
 from ..errors import MissingDependency
+from ..settings import Settings
 from .energy import NormalEnergy
+
+
+def uses_torch(settings: Settings) -> bool:
+    """Whether the energy is differentiated by torch: where that is asked for or, unless NumPy is, installed."""
+    wanted = settings.backend == "auto" and (settings.device == "cuda" or find_spec("torch") is not None)
+    return wanted or settings.backend == "torch"
 
 
 def torch_device(wanted: str) -> str:

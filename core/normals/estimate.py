@@ -1,7 +1,5 @@
 """Stage one: bi-directional normals."""
 
-from importlib.util import find_spec
-
 import numpy as np
 
 from ..errors import InputError, SettingsError
@@ -17,7 +15,7 @@ from ..voronoi.polygons import facet_polygons
 from .adam import minimise
 from .creases import normals_of_sheets
 from .energy import NormalEnergy
-from .energy_torch import torch_device, torch_value_and_gradient
+from .energy_torch import torch_device, torch_value_and_gradient, uses_torch
 from .known import unit_axes
 from .mirrors import Mirrors
 from .pca import pca_normals
@@ -93,16 +91,13 @@ def _least_energy(points, spacing, settings, constraints, progress):
 
 def _backend(settings):
     """What differentiates the energy, and where: "numpy" or "torch", and "cpu" or "cuda"."""
-    backend = settings.backend
-    if backend == "auto":
-        backend = "torch" if settings.device == "cuda" or find_spec("torch") else "numpy"
-    if backend == "torch":
-        return backend, torch_device(settings.device)
+    if uses_torch(settings):
+        return "torch", torch_device(settings.device)
     if settings.device == "cuda":
         raise SettingsError(
             "device is 'cuda' and backend 'numpy', which uses no GPU; use backend 'torch', or device 'cpu'"
         )
-    return backend, "cpu"
+    return "numpy", "cpu"
 
 
 def checked_constraints(constraints, source_index: np.ndarray, count: int):
