@@ -28,7 +28,7 @@ from .io.points import READERS, read_points, read_scan
 from .io.report import digest_of, report_json, report_of, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
-from .points import first_of_each, local_spacing, prepare_samples
+from .points import first_of_each, prepare_samples
 from .reconstruction import Reconstruction
 from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
@@ -321,7 +321,7 @@ def _info(given):
     distinct = len(first_of_each(points, finite))
     low, high = used.min(axis=0), used.max(axis=0)
     grid = fit_grid(used, settings.resolution)
-    spacing = local_spacing(samples.points)
+    spacing = samples.local_spacing()
     noisy, crowded = looks_noisy(samples.points, spacing), crowded_share(samples.points, spacing)
     spacing *= samples.scale
     facts = {

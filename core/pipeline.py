@@ -19,7 +19,7 @@ from .memory import peak_memory_mb
 from .normals.estimate import checked_constraints, estimate_normals
 from .normals.known import known_normals
 from .parallel import workers
-from .points import local_spacing, prepare_samples, rounding_warning
+from .points import prepare_samples, rounding_warning
 from .progress import watched
 from .reconstruction import Reconstruction
 from .settings import WHOLE_BOX, Settings
@@ -74,7 +74,7 @@ def _reconstruct(points, settings, constraints, normals, progress):
         if normals is None:
             samples, cleaning = clean(samples, settings, progress.part(0.01, 0.09, "cleaning"))
         constraints, ignored = checked_constraints(constraints, samples.source_index, given)
-        spacing = local_spacing(samples.points, progress.part(0.09, 0.1, "cleaning"))
+        spacing = samples.local_spacing(progress.part(0.09, 0.1, "cleaning"))
         typical = float(np.median(spacing)) * samples.scale
         rounded = rounding_warning(unmoved, typical)
         del unmoved

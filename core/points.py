@@ -42,6 +42,12 @@ class Samples:
     def to_input_units(self, x: np.ndarray) -> np.ndarray:
         return np.asarray(x, np.float64) * self.scale + self.centre
 
+    def local_spacing(self, progress=None) -> np.ndarray:
+        """:func:`local_spacing` of the points, found when it is first asked for."""
+        if "_spacing" not in vars(self):
+            vars(self)["_spacing"] = local_spacing(self.points, progress)
+        return vars(self)["_spacing"]
+
     def in_spatial_order(self) -> "Samples":
         """The samples as :func:`spatial_order` has them, which is faster for whatever looks at neighbours."""
         return self._of_rows(spatial_order(self.points))

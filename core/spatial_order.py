@@ -26,4 +26,10 @@ def spatial_order(points: np.ndarray) -> np.ndarray:
     for shift, kept in _SPREAD:
         bits = (bits | bits << np.uint64(shift)) & np.uint64(kept)
     x, y, z = bits.T
-    return np.lexsort((*points.T[::-1], x << np.uint64(2) | y << np.uint64(1) | z))
+    cell = x << np.uint64(2) | y << np.uint64(1) | z
+    order = np.argsort(cell, kind="stable")
+    alike = np.diff(cell[order]) == 0
+    several = np.flatnonzero(np.append(alike, False) | np.append(False, alike))
+    rows = order[several]
+    order[several] = rows[np.lexsort((*points[rows].T[::-1], cell[rows]))]
+    return order

@@ -18,7 +18,7 @@ from ..core.io.report import report_json
 from ..core.io.vdb import write_vdb
 from ..core.normals.estimate import checked_constraints, estimate_normals
 from ..core.normals.known import known_normals
-from ..core.points import local_spacing, prepare_samples
+from ..core.points import prepare_samples
 from ..core.progress import Progress
 from ..core.settings import Settings
 from ..core.surface.attributes import nearest_samples, residuals
@@ -186,7 +186,7 @@ def _begun(task, progress):
     share = 0.5 if task.until == NORMALS else 1.0
     samples = prepare_samples(task.points, progress.part(0.0, 0.3 * share, "points")).in_spatial_order()
     samples, report = clean(samples, settings, progress.part(0.3 * share, 0.7 * share, "cleaning"))
-    spacing = local_spacing(samples.points, progress.part(0.7 * share, share, "cleaning"))
+    spacing = samples.local_spacing(progress.part(0.7 * share, share, "cleaning"))
     row = samples.given_order()
     normals, confidence, ignored = None, None, ()
     if task.until == COST:
@@ -255,7 +255,7 @@ def _extracted(task, progress):
     progress.part(0.0, 0.0, "points")(0.0)
     samples = prepare_samples(task.points)
     normals, confidence = known_normals(task.known, len(task.points), samples.source_index)
-    grid, spacing = stored_field.grid_of(task.volume, task.origin, samples), local_spacing(samples.points)
+    grid, spacing = stored_field.grid_of(task.volume, task.origin, samples), samples.local_spacing()
     values = stored_field.distances(task.volume, grid.shape) / np.float32(samples.scale)
     part = progress.part(0.0, 0.2, "surface")
     local = fit_local_surface(samples.points, normals, confidence, spacing, settings.bridge, part)

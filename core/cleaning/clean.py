@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..field.grid import fit_grid
-from ..points import Samples, local_spacing
+from ..points import Samples
 from ..progress import Progress
 from ..settings import Settings
 from .dense_lines import thinned_lines
@@ -79,7 +79,7 @@ def _off_noise(samples, settings, progress):
     """The samples moved off noise, where it is, and what was done; of those that fill a volume evenly, those that bound
     it, moved likewise."""
     points, strength, seed = samples.points, settings.denoise, settings.seed
-    spacing = local_spacing(points, progress.part(0.0, 0.1))
+    spacing = samples.local_spacing(progress.part(0.0, 0.1))
     moved, done = denoise(points, spacing, strength, seed, progress.part(0.1, 0.9))
     if not done:
         return samples, {}

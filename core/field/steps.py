@@ -83,9 +83,9 @@ class NearBand(NodeSet):
         numbers (c,), ascending, and the rows of the corners in the order of :data:`CORNERS`, (8,c)."""
         whole, corner = np.arange(len(row)), row[None]
         for ahead in self.ahead[::-1]:
-            corner = np.concatenate([corner, ahead[corner]])
-            known = np.flatnonzero(corner.min(axis=0) >= 0)
-            whole, corner = whole[known], corner[:, known]
+            further = ahead[corner]
+            known = np.flatnonzero((further >= 0).all(axis=0))
+            whole, corner = whole[known], np.concatenate([each.take(known, axis=1) for each in (corner, further)])
         return whole, corner
 
     def between(self, cells: np.ndarray, spacing: float, off_rims: bool = False) -> tuple[np.ndarray, np.ndarray]:

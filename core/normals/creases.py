@@ -64,11 +64,12 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
             if not (flat | bent).any():
                 break
             moved = moved | flat | bent
-            beside = mirrors.and_around(mirrors.and_around(moved))
-            normals = sweeps_over(_parted(mirrors, normals, moved), normals, beside & ~held, _SWEEPS)
+            beside = mirrors.and_around(moved)
+            swept = mirrors.and_around(beside) & ~held
+            normals = sweeps_over(_parted(mirrors.at(swept), normals, beside), normals, swept, _SWEEPS)
             normals, shared = onto_shared_planes(points, spacing, tree, mirrors, normals, ~fixed)
             held, moved = held | shared, moved | shared
-    parted = _parted(mirrors, normals, moved) if moved.any() else mirrors
+    parted = _parted(mirrors, normals, mirrors.and_around(moved)) if moved.any() else mirrors
     return normals, parted.confidence(normals), moved
 
 
@@ -100,9 +101,8 @@ def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress
     return normals, moved
 
 
-def _parted(mirrors, normals, moved):
-    """The mirrors without those across creases beside samples `moved` (n,) bool."""
-    beside = mirrors.and_around(moved)
+def _parted(mirrors, normals, beside):
+    """The mirrors without those across creases of samples `beside` these, (n,) bool."""
     return mirrors.without(_across(mirrors, normals) & (beside[mirrors.site] | beside[mirrors.other]))
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..lookup import is_among
 from ..parallel import in_order
 from ..progress import Progress
 
@@ -112,7 +113,8 @@ class _Cloud:
         near = np.array(self.tree.query_ball_point(0.5 * (low + high), cube, p=np.inf, return_sorted=True))
         x = self.points[near]
         boxed = ((x >= low - largest) & (x <= high + largest)).all(axis=1)
-        near, x = near[boxed], x[boxed]
+        others = boxed & ~is_among(near, own)
+        x = x[others]
         raised = KDTree(np.column_stack([points, np.sqrt(largest**2 - reach**2)]))
         distance, _ = raised.query(np.column_stack([x, np.zeros(len(x))]), distance_upper_bound=_SLACK * largest)
-        return Block(own, near[np.isfinite(distance)])
+        return Block(own, np.sort(np.append(own, near[others][np.isfinite(distance)])))

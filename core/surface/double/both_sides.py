@@ -66,11 +66,11 @@ def _sides(sheet):
     """Around each edge its faces are in order of their angles, and the side of each that faces ahead is joined to the
     side of the next one that faces back; of a face alone, both its sides. So the sides around a vertex follow each
     other in cycles: from low end to low end one way, from high end to high end the other."""
-    corner, corners = sheet.faces.reshape(-1), sheet.faces.size
+    corner, corners = sheet.faces.reshape(-1), sheet.faces.dtype.type(sheet.faces.size)
     edge, count = sheet.edges.number.reshape(-1), sheet.edges.count
     order, several = order_around(sheet), np.repeat(count, count)
-    here, after = np.arange(corners), corner_after(np.arange(corners))
-    ends = sheet.edges.corners_at_ends(here)
+    here = np.arange(corners, dtype=corner.dtype)
+    after, ends = corner_after(here), sheet.edges.corners_at_ends(here)
     upwards = ends[0] == here
     following, last = np.roll(order, -1), np.cumsum(count) - 1
     following[last] = order[last - count + 1]

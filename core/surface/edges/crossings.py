@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...field.grid import CORNERS, Grid, node_strides
+from ...field.grid import Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
 from ...linalg import COMPONENTS, dots, principal_axes, row_dots
@@ -38,8 +38,7 @@ _OFF, _AROUND = 0.02, 8  # cells, by which a foot is off the plane of a sample o
 _TURNED = 8  # steps along edges from odd faces, up to where edges are turned over
 _CHUNK = 1 << 15  # cells
 
-_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(CORNERS[a] - CORNERS[b]).sum() == 1])
-_EDGE_AXIS = np.abs(CORNERS[_EDGES[:, 1]] - CORNERS[_EDGES[:, 0]]).argmax(axis=1)
+_EDGES = np.array([(low, low + step) for step in (4, 2, 1) for low in range(8) if not low & step])  # as CORNERS are
 
 
 @dataclass(frozen=True)
@@ -172,9 +171,14 @@ def _vote(band, corner, surface, grid, progress):
     chunks = even_chunks(corner.shape[1], _CHUNK, progress.part(0.3, 1.0))
     cast = in_order(lambda part: _ballots(steps.take(corner[:, part], axis=1), grid.spacing), chunks)
     ballots = zip((np.empty((12, 0)),) * 3, *(found for _, found in cast), strict=True)
-    edge = (3 * corner[_EDGES[:, 0]] + _EDGE_AXIS[:, None]).reshape(-1)
-    counts = in_order(lambda each: np.bincount(edge, np.concatenate(each, axis=1).reshape(-1)), ballots)
-    vote, weight, share = (count for _, count in counts)
+
+    def count(ballot):
+        by_axis = np.concatenate(ballot, axis=1).reshape(3, -1)
+        counts = [np.bincount(low, along, len(band.node)) for low, along in zip(lowest, by_axis, strict=True)]
+        return np.stack(counts, axis=1).reshape(-1)
+
+    lowest = [corner[edges].reshape(-1) for edges in np.split(_EDGES[:, 0], 3)]
+    vote, weight, share = (found for _, found in in_order(count, ballots))
     voted = np.flatnonzero(weight)
     return voted, vote[voted], share[voted] / weight[voted]
 

@@ -191,16 +191,18 @@ def _in_threes(i, j, nearest, unlike, surface):
     found, columns = np.empty(len(i), bool), (surface.columns.points, surface.normals.T)
 
     def look(part):
-        samples = i[part, None], j[part, None], nearest[i[part]]
+        pair, column = np.nonzero(unlike[i[part]])
+        own, other = i[part][pair], j[part][pair]
+        samples = own, other, nearest[own, column]
         (p, q, r), (n, o, m) = ([np.stack([x.take(some) for x in of]) for some in samples] for of in columns)
         sides = (
             dots(q - p, n) * dots(r - p, n),
             dots(p - q, o) * dots(r - q, o),
             dots(p - r, m) * dots(q - r, m),
         )
-        limit = (_PARTED * surface.spacing[i[part], None]) ** 2
-        third = unlike[i[part]] & (np.max(sides, axis=0) < -limit) & (np.abs(dots(cross(n, o), m)) < _LEVEL)
-        found[part] = third.sum(axis=1) >= _THIRD
+        limit = (_PARTED * surface.spacing[own]) ** 2
+        third = (np.max(sides, axis=0) < -limit) & (np.abs(dots(cross(n, o), m)) < _LEVEL)
+        found[part] = np.bincount(pair, third, len(found[part])) >= _THIRD
 
     over_rows(look, len(i), _CHUNK)
     return found

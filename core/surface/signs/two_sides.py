@@ -38,6 +38,7 @@ _SHARP, _FOLD = -0.1, 0.9  # cosines between normals into the wedge of a sharp f
 _CHUNK = 1 << 13  # places
 _BEYOND = 3.0  # cells, distance that nodes out of the band count as
 _ITERATIONS, _STEPS, _TOLERANCE, _SHIFT = 6, 300, 0.03, 1e-3
+_SETTLED = 1e-3  # of the samples, that still change sides when no iteration follows; sweeps see to those
 _SWEEPS = 12
 _LEAST = 0.1  # cells, least distance of nodes past a rim from the sheet continued
 _MOST = 0.02  # of the votes, more overruled ones mean that there are no two sides
@@ -215,7 +216,7 @@ def _orientations(links, progress):
         )
         length = np.sqrt(np.bincount(part, facing**2) / size)
         facing = np.clip(facing / np.maximum(length, np.finfo(float).tiny)[part], -1, 1)
-        if ((facing > 0) == before).all():
+        if ((facing > 0) != before).mean() <= _SETTLED:
             break
     return facing
 

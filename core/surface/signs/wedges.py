@@ -34,7 +34,7 @@ def at_wedges(
         return np.zeros(len(places), bool)
     sample, patch = surface.tree.query(places, workers=-1)[1], near_parts(places, ADJACENT * cell)
     crease = surface.rims.limit[sample].min(axis=1) <= _CREASE * surface.spacing[sample]
-    narrow = KDTree(parting).query(places, workers=-1)[0] <= _NARROW * cell
+    narrow = np.isfinite(KDTree(parting).query(places, distance_upper_bound=_NARROW * cell, workers=-1)[0])
     shown = np.isfinite(surface.room[sample]) | (crease & narrow)
     shown |= _is_scattered(patch, sample, many, surface)[patch]
     shown &= ~passing[sample]
