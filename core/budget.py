@@ -60,7 +60,7 @@ def estimate_cost(
     spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False, crowded: float = 0.0
 ) -> Estimate:
     """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
-    settings the resolution, the band, the surface and, for the memory, solver and integration count.
+    settings the band, the surface and, for the memory, solver, backend and integration count.
 
     crowded : share of the samples where sheets run close, see :func:`crowded_share`; counts for clean ones alone
 

@@ -14,9 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from tqdm import tqdm
 
-from .budget import SUITED, crowded_share, estimate_cost, suited_resolution
-from .cleaning.clean import clean
-from .cleaning.noise import looks_noisy
+from .budget import SUITED, estimate_cost
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
 from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
 from .field.grid import fit_grid
@@ -28,7 +26,8 @@ from .io.points import READERS, read_points, read_scan
 from .io.report import digest_of, report_json, report_of, write_report
 from .io.vdb import write_vdb
 from .pipeline import reconstruct
-from .points import first_of_each, prepare_samples
+from .points import first_of_each
+from .prospect import look_ahead
 from .reconstruction import Reconstruction
 from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
@@ -54,7 +53,8 @@ With --json, stdout holds one JSON document and nothing else: the report, or {{"
 stderr.
 """
 _OUTPUTS = """\
-files in the folder OUT, named after the scan, all of them written whole or none at all:
+files in the folder OUT, named after the scan, each written whole, or none where one cannot be put in place; one that
+cannot be made, as the volume without OpenVDB, is left out with a warning:
   SCAN.vdb         OpenVDB grids: udf (distance to the surface; sdf where signed) and density (fog to look at)
   SCAN_double.ply  mesh: the closed two-sided cover of the surface (with --surface double or both)
   SCAN_single.ply  mesh: one layer, open where the surface is (with --surface single or both)
@@ -68,7 +68,7 @@ files in the folder OUT, named after the scan, all of them written whole or none
 All are in the scan's own units and place. Vertices of meshes have the properties distance (how far off the surface)
 and confidence (of the nearest sample). Meshes and points also carry what the points of a .ply do, of a table whose
 columns have names or of a scanner's .pts: colours (red, green, blue), intensity and every other property that is one
-number, with scan_ before its name where it has one of those two.
+number and no normal, with scan_ before its name where it has one of those two.
 """
 
 
@@ -313,34 +313,33 @@ def _summary(report):
 def _info(given):
     settings = Settings(resolution=given.resolution, band=given.band, surface=given.surface)
     points = read_points(given.scan)
-    every = prepare_samples(points)
-    samples, dropped = clean(every, Settings(denoise=0.0))
+    found = look_ahead(points, settings)
+    samples, dropped = found.samples, found.cleaning["outliers"]
     nearest = KDTree(samples.points).query(samples.points, k=2, workers=-1)[0][:, 1] * samples.scale
     used = points[samples.source_index]
     finite = np.flatnonzero(np.isfinite(points).all(axis=1))
     distinct = len(first_of_each(points, finite))
     low, high = used.min(axis=0), used.max(axis=0)
     grid = fit_grid(used, settings.resolution)
-    spacing = samples.local_spacing()
-    noisy, crowded = looks_noisy(samples.points, spacing), crowded_share(samples.points, spacing)
-    spacing *= samples.scale
+    spacing = samples.local_spacing() * samples.scale
     facts = {
         "scan": given.scan,
         "points": len(points),
         "not_finite": len(points) - len(finite),
         "duplicates": len(finite) - distinct,
-        "near_copies": distinct - len(every.points),
-        "outliers": dropped["outliers"],
+        "near_copies": distinct - found.prepared,
+        "outliers": dropped,
+        "in_solids_or_lines": found.prepared - dropped - len(samples.points),
         "box": {"low": low, "high": high, "size": high - low},
         "nearest_neighbour": {"smallest": nearest.min(), "median": np.median(nearest), "largest": nearest.max()},
         "spacing": np.median(spacing),
         "resolution": settings.resolution,
-        "suited_resolution": suited_resolution(used, spacing),
+        "suited_resolution": found.suited,
         "band": settings.band,
         "grid": {"shape": grid.shape, "cell": grid.spacing},
-        "noisy": noisy,
-        "crowded": crowded,
-        "estimate": asdict(estimate_cost(spacing, grid, settings, noisy, crowded)),
+        "noisy": found.noisy,
+        "crowded": found.crowded,
+        "estimate": asdict(estimate_cost(spacing, grid, settings, found.noisy, found.crowded)),
     }
     print(report_json(facts) if given.json else _described(facts))
 
@@ -353,7 +352,8 @@ def _described(facts):
     band = "" if facts["band"] is None else f", those within {facts['band']:g} cells of the surface alone"
     return (
         f"points   {facts['points']}, of which {facts['not_finite']} not finite, {facts['duplicates']} duplicates, "
-        f"{facts['near_copies']} near copies of others and {facts['outliers']} outliers\n"
+        f"{facts['near_copies']} near copies of others and {facts['outliers']} outliers; "
+        f"{facts['in_solids_or_lines']} more are dropped inside solids and on dense lines\n"
         f"box      {low} to {high}, size {size}\n"
         f"nearest  {median} from point to point in the median ({smallest} to {largest})\n"
         f"spacing  {facts['spacing']:.3g}, the local spacing in which --bridge counts (median)\n"

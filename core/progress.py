@@ -37,8 +37,10 @@ class Progress:
 
     @classmethod
     def of(cls, progress: "Progress | ProgressCallback | None") -> "Progress":
-        """Accept what a public stage function accepts: a slice, a plain callback or nothing."""
-        return progress if isinstance(progress, cls) else cls(progress)
+        """Accept what a public stage function accepts: a slice, a plain callback or nothing. Fractions that a plain
+        callback hears never fall: where a stage is done late, whose slice of the bar lies further back, it hears the
+        highest one so far until that is passed."""
+        return progress if isinstance(progress, cls) else cls(progress and _rising(progress))
 
     def part(self, start: float, stop: float, text: str | None = None) -> "Progress":
         """The sub-slice from `start` to `stop` (fractions of this slice), under a new stage name if one is given."""
@@ -83,6 +85,18 @@ class Progress:
             raise Cancelled(f"cancelled during '{self._text}'; nothing was written")
 
 
+def _rising(callback):
+    """A callback that passes reports on, of each fraction and all before the largest."""
+    farthest = 0.0
+
+    def report(fraction, text):
+        nonlocal farthest
+        farthest = max(farthest, fraction)
+        return callback(farthest, text)
+
+    return report
+
+
 class _Outcome(NamedTuple):
     result: Any
     error: BaseException | None
@@ -93,9 +107,8 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
 
     A callback hears of the progress in the caller's thread while the work is done in another: at every report, and
     the last one again where the work is silent for long. So a cancel is heeded at once, even while a library sorts
-    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. Fractions
-    never fall: where a stage is done late, whose slice of the bar lies further back, the callback hears the highest one
-    so far until that is passed. With a `Progress` or nothing to report to, all is done in the caller's thread.
+    millions of numbers and cannot be stopped; the work ends at its next look, and nobody hears of it again. With a
+    `Progress` or nothing to report to, all is done in the caller's thread.
     """
     if progress is None or isinstance(progress, Progress):
         with starting_threads():
@@ -113,7 +126,7 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
         except BaseException as error:  # noqa: BLE001  raised again in the caller's thread
             reports.put(_Outcome(None, error))
 
-    thread, last, farthest = Thread(target=run, daemon=True), None, 0.0
+    thread, last, callback = Thread(target=run, daemon=True), None, _rising(progress)
     with starting_threads():
         thread.start()
     try:
@@ -123,8 +136,7 @@ def watched(work: Callable[[Progress], Any], progress: Progress | ProgressCallba
             if isinstance(last, _Outcome):
                 break
             if last is not None:
-                farthest = max(farthest, last[0])
-                Progress(progress, text=last[1])(farthest)
+                Progress(callback, text=last[1])(last[0])
     finally:
         cancelled.set()
         thread.join(_FAREWELL)

@@ -144,7 +144,7 @@ class Settings:
         True,
         "Drop stray points far from any surface, the few that lie further from all others than these from each other, "
         "those inside a solid that points fill, and most of lines whose points lie much closer than cells and the next "
-        "line, before anything else; what is dropped is said",
+        "line; what is dropped is said",
     )
     denoise: float | str = _option(
         "auto",

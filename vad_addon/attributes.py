@@ -101,20 +101,25 @@ def _at_points(mesh, of_corners):
 
 
 def renamed(attributes: dict[str, Attribute], taken=()) -> dict[str, Attribute]:
-    """The same under names that are free: those that are `taken`, or that Blender goes by, get `scan_` put before."""
+    """The same under names that are free and short enough: those that are `taken`, or that Blender goes by, get `scan_`
+    put before, long ones are cut off, and then those that are alike numbered."""
     free = {}
     for name, attribute in attributes.items():
         while name in free or name in taken or name in _BLENDERS:
             name = _OTHERS + name
-        free[name] = attribute
+        endings = ("", *(f"_{number}" for number in range(2, 2 + len(free))))
+        free[next(short for short in (_cut(name, ending) for ending in endings) if short not in free)] = attribute
     return free
 
 
+def _cut(name, ending):
+    return name.encode()[: _LONGEST - len(ending)].decode(errors="ignore") + ending
+
+
 def write(data, attributes: dict[str, Attribute]) -> None:
-    """Set these attributes on the points of `data`, replacing those of the same name. Those that Blender goes by, or
-    that points cannot have there, get `scan_` before their name, and long names are cut off."""
+    """Set these attributes on the points of `data`, replacing those of the same name, see :func:`renamed`. Those that
+    points cannot have there get `scan_` before their name, too."""
     for name, attribute in renamed(attributes).items():
-        name = name.encode()[:_LONGEST].decode(errors="ignore")
         if name in data.attributes and data.attributes[name].data_type != attribute.kind:
             data.attributes.remove(data.attributes[name])
         target = (

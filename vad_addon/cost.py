@@ -1,11 +1,12 @@
 """What a run would cost, asked before it starts: shown in the sidebar for as long as the same points are selected."""
 
+import json
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
-from ..core.budget import advised_band, estimate_cost, suited_resolution
+from ..core.budget import advised_band, estimate_cost
 from ..core.errors import VADError
 from ..core.field.grid import fit_grid
 from ..core.settings import WHOLE_BOX, Settings
@@ -17,22 +18,22 @@ from .properties import chosen, settings_from
 @dataclass(frozen=True)
 class Points:
     """What the cost depends on: corners (2,3) of the box and local spacing (n,) of the samples, in scene units, whether
-    the samples look noisy, and the share of them where sheets run close."""
+    the samples look noisy, the share of them where sheets run close; and the resolution that suits them. Where dense
+    lines were thinned, `thinned_for` is the resolution that this was for, else None."""
 
     corners: np.ndarray
     spacing: np.ndarray
     noisy: bool
     crowded: float
+    suited: int
+    thinned_for: int | None
 
     @classmethod
     def of(cls, found: Outcome) -> "Points":
         """What was found where :data:`COST` was asked for."""
-        corners = np.stack([found.points.min(axis=0), found.points.max(axis=0)])
-        return cls(corners, found.spacing, found.noisy, found.crowded)
-
-    def suits(self) -> int:
-        """The resolution at which the points are a cell and a half apart."""
-        return suited_resolution(self.corners, self.spacing)
+        corners, report = np.stack([found.points.min(axis=0), found.points.max(axis=0)]), json.loads(found.report)
+        thinned_for = report["settings"]["resolution"] if report["cleaning"]["thinned"] else None
+        return cls(corners, found.spacing, found.noisy, found.crowded, found.suited, thinned_for)
 
     def cost(self, settings: Settings) -> list[str]:
         """Lines on these points and on the time and memory that `settings` would take."""
@@ -41,7 +42,7 @@ class Points:
         estimate = estimate_cost(self.spacing, grid, settings, noisy, self.crowded)
         return [
             f"{len(self.spacing):,} points, {np.median(self.spacing):.3g} apart",
-            f"Suits: resolution {self.suits()}",
+            f"Suits: resolution {self.suited}",
             f"At {settings.resolution}: {status.duration(estimate.seconds)}, {estimate.memory_mb:,.0f} MiB",
         ]
 
@@ -51,7 +52,8 @@ _told = {}  # settings: the lines on them
 
 
 def lines(context: bpy.types.Context) -> list[str]:
-    """What is known of the cost for what is selected and set now; empty where nobody asked yet."""
+    """What is known of the cost for what is selected and set now; empty where nobody asked yet, and where dense lines
+    were thinned for another resolution."""
     global _asked
     if _asked is not None and _asked[0] != _selected(context):
         _asked = None
@@ -60,6 +62,8 @@ def lines(context: bpy.types.Context) -> list[str]:
         return []
     try:
         settings = settings_from(context.scene.vad)
+        if _asked[1].thinned_for not in (None, settings.resolution):
+            return []
         if settings not in _told:
             _told.clear()
             _told[settings] = _asked[1].cost(settings)
@@ -70,7 +74,7 @@ def lines(context: bpy.types.Context) -> list[str]:
 
 def suits() -> int:
     """The resolution that suits the points asked about, 0 where nobody asked."""
-    return _asked[1].suits() if _asked else 0
+    return _asked[1].suited if _asked else 0
 
 
 def _selected(context):

@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import pipeline
-from ..core.budget import crowded_share
 from ..core.cleaning.clean import clean
-from ..core.cleaning.noise import looks_noisy
 from ..core.errors import VADError
 from ..core.field.integration import near_band
 from ..core.field.local_surface import fit_local_surface
@@ -20,6 +18,7 @@ from ..core.normals.estimate import checked_constraints, estimate_normals
 from ..core.normals.known import known_normals
 from ..core.points import prepare_samples
 from ..core.progress import Progress
+from ..core.prospect import look_ahead
 from ..core.settings import Settings
 from ..core.surface.attributes import nearest_samples, residuals
 from ..core.surface.extract import extract_surfaces
@@ -115,6 +114,7 @@ class Outcome:
     spacing  : (n',) float64, local spacing of the points, if asked for COST
     noisy    : whether they look noisy, if asked for that
     crowded  : share of them where sheets run close, if asked for that, see :func:`crowded_share`
+    suited   : the resolution that suits them, if asked for that, see :class:`Prospect`
     """
 
     points: np.ndarray
@@ -133,6 +133,7 @@ class Outcome:
     spacing: np.ndarray | None = None
     noisy: bool | None = None
     crowded: float | None = None
+    suited: int | None = None
 
     def save(self, path: Path) -> None:
         names = "points", "source_index", "normals", "confidence", "origin", "spacing"
@@ -140,7 +141,7 @@ class Outcome:
         for skin in _SKINS:
             if (found := getattr(self, skin)) is not None:
                 arrays |= {f"{skin}.{name}": array for name, array in vars(found).items()}
-        told = "cell", "shape", "report", "warnings", "seconds", "noisy", "crowded"
+        told = "cell", "shape", "report", "warnings", "seconds", "noisy", "crowded", "suited"
         facts = {name: getattr(self, name) for name in told}
         facts["volume"] = self.volume and str(self.volume)
         np.savez(path, **arrays, facts=json.dumps(facts))
@@ -179,39 +180,39 @@ def compute(task: Task, folder: Path, progress=None) -> Outcome:
 
 
 def _begun(task, progress):
-    """The first stages alone. For what a run's cost depends on, neither steps of depth nor noise are mended."""
-    start, settings, measured = time.perf_counter(), task.settings, {}
+    """The first stages alone."""
+    start = time.perf_counter()
     if task.until == COST:
-        settings = replace(settings, denoise=0.0)
+        found = look_ahead(task.points, task.settings, progress)
+        spacing = found.samples.local_spacing()[found.samples.given_order()] * found.samples.scale
+        told = {"noisy": found.noisy, "crowded": found.crowded, "suited": found.suited, "spacing": spacing}
+        return _of_samples(task, found.samples, found.cleaning, start, **told)
     share = 0.5 if task.until == NORMALS else 1.0
     samples = prepare_samples(task.points, progress.part(0.0, 0.3 * share, "points")).in_spatial_order()
-    samples, report = clean(samples, settings, progress.part(0.3 * share, 0.7 * share, "cleaning"))
+    samples, cleaning = clean(samples, task.settings, progress.part(0.3 * share, 0.7 * share, "cleaning"))
     spacing = samples.local_spacing(progress.part(0.7 * share, share, "cleaning"))
+    if task.until != NORMALS:
+        return _of_samples(task, samples, cleaning, start)
+    constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
+    part, row = progress.part(share, 1.0, "normals"), samples.given_order()
+    normals, confidence, _ = estimate_normals(samples.points, spacing, task.settings, constraints, part)
+    return _of_samples(task, samples, cleaning, start, ignored, normals=normals[row], confidence=confidence[row])
+
+
+def _of_samples(task, samples, cleaning, start, warnings=(), **found):
+    """The outcome of a run that ended before the field."""
     row = samples.given_order()
-    normals, confidence, ignored = None, None, ()
-    if task.until == COST:
-        noisy, crowded = (of(samples.points, spacing) for of in (looks_noisy, crowded_share))
-        measured = {"spacing": spacing[row] * samples.scale, "noisy": bool(noisy), "crowded": crowded}
-    if task.until == NORMALS:
-        constraints, ignored = checked_constraints(task.constraints, samples.source_index, len(task.points))
-        part = progress.part(share, 1.0, "normals")
-        normals, confidence, _ = estimate_normals(samples.points, spacing, task.settings, constraints, part)
-        normals, confidence = normals[row], confidence[row]
+    nothing = dict.fromkeys(("normals", "confidence", "surface", "sheet", "volume"))
     return Outcome(
         points=samples.given[row],
         source_index=samples.source_index[row],
-        normals=normals,
-        confidence=confidence,
-        surface=None,
-        sheet=None,
-        volume=None,
         origin=centre(samples.given),
-        cell=float(np.median(spacing)) * samples.scale,
+        cell=float(np.median(samples.local_spacing())) * samples.scale,
         shape=(),
-        report=report_json({"settings": asdict(task.settings), "cleaning": report}),
-        warnings=(*samples.warnings, *ignored),
+        report=report_json({"settings": asdict(task.settings), "cleaning": cleaning}),
+        warnings=(*samples.warnings, *warnings),
         seconds=time.perf_counter() - start,
-        **measured,
+        **nothing | found,
     )
 
 

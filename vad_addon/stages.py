@@ -1,6 +1,5 @@
 """Operators that do one stage of a run alone: cleaned points, normals, or everything after the normals anew."""
 
-import json
 from dataclasses import asdict
 
 import bpy
@@ -63,10 +62,10 @@ class VAD_OT_denoise(run.Run, bpy.types.Operator):
         if points_in.active_object(context) in points_in.objects_of(source):
             results.leave_modes(context)  # else the copy could not become the active object
         results.take_the_stage(context, obj, source.uids)
-        for warning in source.warnings:
+        for warning in (*source.warnings, *found.warnings):
             self.report({"WARNING"}, warning)
-        dropped = json.loads(found.report)["cleaning"]["outliers"]
-        facts = f"{len(rows):,} points, {dropped:,} strays dropped, moved by {moved.mean():.3g} on average"
+        dropped = len(source.points) - len(rows)
+        facts = f"{len(rows):,} points, {dropped:,} dropped, moved by {moved.mean():.3g} on average"
         self.report({"INFO"}, f"{obj.name}: {facts}")
 
 

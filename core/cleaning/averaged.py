@@ -12,6 +12,7 @@ from .anchors import some_samples
 
 _LOOKED_AT, _NEAREST = 3000, 8  # samples, and the nearest to each, that are in other cells
 _SIDES = 0.6, 1.6  # local spacings: cells of one sample have sides of about one
+_WIDEST = 1000.0  # local spacings, how far from one of them the others are; waves to look at grow in number with it
 _PER_TURN = 4  # frequencies looked at, for each by which waves over the whole cloud differ by one
 _FINER = np.linspace(-1, 1, 81)  # of the step between frequencies
 _WAVES = 256  # looked at together
@@ -29,10 +30,11 @@ def cells_of_means(points: np.ndarray, spacing: np.ndarray, seed: int = 0) -> fl
     many do if the cells are moved aside by half a side. Scattered samples share cells in both places, and those of a
     lattice, which :mod:`.voxels` finds, in neither.
     """
-    rows = some_samples(points, min(_LOOKED_AT, len(points)), seed)
-    here = points[rows]
-    step = 1.0 / (_PER_TURN * np.ptp(points, axis=0).max())
-    frequency, phase = _wave(here, np.median(spacing), step)
+    typical, middle = np.median(spacing), points[some_samples(points, 1, seed)]
+    around = points[(np.abs(points - middle) <= _WIDEST * typical).all(axis=1)]
+    here = around[some_samples(around, min(_LOOKED_AT, len(around)), seed)]
+    step = 1.0 / (_PER_TURN * np.ptp(around, axis=0).max())
+    frequency, phase = _wave(here, typical, step)
     near = points[k_nearest(KDTree(points), here, _NEAREST + 1)[1][:, 1:]]
     one, other = np.repeat(here.T, _NEAREST, axis=1), near.reshape(-1, 3).T
     longest = 1.0 / max(frequency - _ROUNDS * step, np.finfo(float).tiny)

@@ -19,7 +19,7 @@ _FAR = 2.0  # sides of the box around all over that around those kept, from whic
 
 def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> tuple[Samples, dict]:
     """Samples without strays, noise, steps of depth and insides of solids, with dense lines thinned; and what was done
-    about strays, noise and steps, in input units, for the report.
+    about strays, lines, noise and steps, in input units, for the report.
 
     Clean samples come back as they are, bit for bit.
     """
@@ -32,10 +32,12 @@ def clean(samples: Samples, settings: Settings = Settings(), progress=None) -> t
         dropped = np.zeros(len(samples.points), bool)
     if dropped.any():
         samples = samples.without(dropped, _said_of_dropped(dropped, samples.points))
+    count = len(samples.points)
     if settings.outliers:
         samples = _with_lines_thinned(samples, settings.resolution, progress.part(0.3, 0.4))
+    thinned = count - len(samples.points)
     samples, done = _off_noise(samples, settings, progress.part(0.4, 1.0))
-    return samples, {"outliers": int(dropped.sum()), **stepped, **done}
+    return samples, {"outliers": int(dropped.sum()), "thinned": thinned, **stepped, **done}
 
 
 def _with_lines_thinned(samples, resolution, progress):

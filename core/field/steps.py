@@ -80,7 +80,7 @@ class NearBand(NodeSet):
 
     def whole_cells(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of the cells whose lowest nodes have these rows (m,), or -1, those with all eight corners in the band: their
-        numbers (c,), ascending, and the rows of the corners in the order of :data:`CORNERS`, (8,c)."""
+        numbers (c,), ascending, and the rows of the corners in the order of :data:`.grid.CORNERS`, (8,c)."""
         whole, corner = np.arange(len(row)), row[None]
         for ahead in self.ahead[::-1]:
             further = ahead[corner]

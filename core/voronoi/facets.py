@@ -91,10 +91,10 @@ def voronoi_facets(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progr
 
     Raises :class:`InputError` where distances are too different in size for Qhull.
     """
-    return joined(list(by_blocks(lambda sides: facets_of(sides, spacing), points, spacing, seed, progress)))[0]
+    return merged(list(by_blocks(lambda sides: facets_of(sides, spacing), points, spacing, seed, progress)))[0]
 
 
-def joined(blocks: list[Facets]) -> tuple[Facets, np.ndarray]:
+def merged(blocks: list[Facets]) -> tuple[Facets, np.ndarray]:
     """The facets of all blocks, and where each of these was among those of the blocks one after another."""
     pairs = np.concatenate([facets.pairs for facets in blocks])
     order = np.argsort(pairs[:, 0] * (pairs.max(initial=0) + 1) + pairs[:, 1])

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..linalg import row_dots, tangent_frames
 from ..lookup import rows_of, sums_of_each
-from .facets import Facets, by_blocks, clip_radius, facets_of, inside_ball, joined
+from .facets import Facets, by_blocks, clip_radius, facets_of, inside_ball, merged
 
 _ARC_STEP = 0.25  # radians; longest chord that stands for a piece of the clip circle
 _SAME_ANGLE = 1e-9  # radians
@@ -39,7 +39,7 @@ class FacetPolygons:
 def facet_polygons(points: np.ndarray, spacing: np.ndarray, seed: int = 0, progress=None) -> FacetPolygons:
     """The polygons whose areas `voronoi_facets` returns; arguments as there."""
     blocks = list(by_blocks(lambda sides: _polygons(sides, points, spacing), points, spacing, seed, progress))
-    facets, order = joined([polygons.facets for polygons in blocks])
+    facets, order = merged([polygons.facets for polygons in blocks])
     count = np.concatenate([np.diff(polygons.first) for polygons in blocks])
     begin, count = (np.cumsum(count) - count)[order], count[order]
     first = np.concatenate([[0], np.cumsum(count)])

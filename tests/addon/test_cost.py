@@ -22,8 +22,8 @@ def test_the_estimate_names_points_resolution_time_and_memory(blender, extension
     count, apart = re.fullmatch(r"([\d,]+) points, ([\d.]+) apart", lines[0]).groups()
     assert count == "1,000"
     assert float(apart) == pytest.approx(50 * 0.112, rel=0.3)  # sqrt(4 pi / 1000), about, less for uneven points
-    assert points.suits() == pytest.approx(1.5 * 1.25 * 2 * 50 / float(apart), rel=0.05)
-    assert lines[1] == f"Suits: resolution {points.suits()}"
+    assert points.suited == pytest.approx(1.5 * 1.25 * 2 * 50 / float(apart), rel=0.05)
+    assert lines[1] == f"Suits: resolution {points.suited}"
     assert re.fullmatch(r"At 100: [\dhmins ]+, \d+ MiB", lines[2])
 
 
@@ -87,6 +87,20 @@ def test_strays_count_where_they_stay(blender, extension, add_mesh, sphere):
     assert cost.lines(blender.context) == []
     blender.ops.vad.estimate()
     assert cost.lines(blender.context)[0].startswith("501 points")
+
+
+def test_of_dense_lines_the_answer_is_for_the_resolution_asked(blender, extension, add_mesh):
+    cost, stored = extension("vad_addon.cost"), blender.context.scene.vad
+    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 2000, endpoint=False), np.linspace(0, 1, 9))
+    add_mesh("Rings", np.stack([np.cos(turn), np.sin(turn), height], axis=2).reshape(-1, 3))
+    said = {}
+    for resolution in (32, 512):
+        stored.resolution = resolution
+        assert cost.lines(blender.context) == []
+        blender.ops.vad.estimate()
+        said[resolution] = cost.lines(blender.context)
+    assert said[32][0] != said[512][0]
+    assert said[32][1] == said[512][1]
 
 
 def test_noisy_points_are_noticed(points_of):

@@ -98,6 +98,17 @@ def test_columns_that_points_cannot_have_in_blender_get_another_name(blender, tm
     assert blender.ops.vad.reconstruct(resolution=16) == {"FINISHED"}
 
 
+def test_long_names_of_columns_that_begin_alike_stay_apart(blender, tmp_path):
+    names = [70 * "a" + each for each in "bcd"]
+    (tmp_path / "scan.csv").write_text(
+        "x,y,z," + ",".join(names) + "\n" + "".join(f"{k},0,1,5,6,7\n" for k in range(4))
+    )
+    blender.ops.vad.import_points(filepath=str(tmp_path / "scan.csv"))
+    held = blender.context.active_object.data.attributes
+    for name, expected in ((62 * "a", 5), (60 * "a" + "_2", 6), (60 * "a" + "_3", 7)):
+        assert [value.value for value in held[name].data] == [expected] * 4
+
+
 def test_a_file_that_cannot_be_read_is_one_sentence_and_no_object(blender, tmp_path):
     (tmp_path / "bad.xyz").write_text("no numbers here\n")
     with pytest.raises(RuntimeError, match=r"bad\.xyz") as caught:

@@ -69,6 +69,17 @@ def test_cleaned_points_are_a_copy_with_all_that_they_carry(blender, scan, noisy
     assert_array_equal(number[held.any(axis=1)], [3, 400])
 
 
+def test_all_that_cleaning_drops_is_told(blender, add_mesh, capfd):
+    place = np.indices((11, 11, 11)).reshape(3, -1).T - 5.0
+    add_mesh("Ball of voxels", place[np.linalg.norm(place, axis=1) < 5.2])
+    count = len(blender.context.active_object.data.vertices)
+    blender.ops.vad.denoise()
+    kept, told = len(blender.context.view_layer.objects.active.data.points), capfd.readouterr().out
+    assert kept < count
+    assert f"Warning: {count - kept} of {count} points lie inside a solid of voxels" in told
+    assert f"{kept} points, {count - kept} dropped" in told
+
+
 @pytest.mark.parametrize("mode", ["EDIT", "SCULPT"])
 def test_cleaned_points_are_the_active_object_whatever_mode_it_was_in(blender, scan, mode):
     blender.ops.object.mode_set(mode=mode)

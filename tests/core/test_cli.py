@@ -501,6 +501,19 @@ def test_info_is_of_a_run_that_drops_strays(capsys, scan, tmp_path):
     }
 
 
+def test_info_tells_what_a_run_takes_of_dense_lines(capsys, tmp_path):
+    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 4000, endpoint=False), np.linspace(0, 1, 9))
+    np.save(tmp_path / "rings.npy", np.stack([np.cos(turn), np.sin(turn), height], axis=2).reshape(-1, 3))
+    coarse, fine = (
+        json.loads(run(capsys, "info", tmp_path / "rings.npy", "--json", "--resolution", each)[1]) for each in (32, 256)
+    )
+    assert 0 < fine["in_solids_or_lines"] < coarse["in_solids_or_lines"] < 36_000
+    assert fine["spacing"] < coarse["spacing"]
+    assert fine["suited_resolution"] == coarse["suited_resolution"]
+    out = run(capsys, "info", tmp_path / "rings.npy", "--resolution", 32)[1]
+    assert f"{coarse['in_solids_or_lines']} more are dropped inside solids and on dense lines" in out
+
+
 def test_info_tells_near_copies_from_duplicates(capsys, tmp_path):
     points = np.random.default_rng(0).uniform(size=(1000, 3)) * [1, 1, 0]
     np.save(tmp_path / "scan.npy", np.vstack([points, points[:400] + 1e-6, points[:7]]))

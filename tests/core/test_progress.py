@@ -147,3 +147,12 @@ class TestWatched:
             watched(broken, lambda *_: True)
         with pytest.raises(RuntimeError, match="broken"):
             watched(lambda progress: progress(0.5), broken)
+
+
+def test_what_a_plain_callback_hears_never_falls():
+    seen, callback = recorder()
+    progress = Progress.of(callback)
+    progress.part(0.5, 1.0, "late")(0.8)
+    progress.part(0.0, 0.5, "early")(0.4)
+    progress.part(0.5, 1.0, "late")(1.0)
+    assert seen == [(0.9, "late"), (0.9, "early"), (1.0, "late")]

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from core.cleaning import averaged
 from core.cleaning.averaged import cells_of_means
 from core.cleaning.noise import noisy_samples
 from core.points import local_spacing
@@ -62,3 +63,15 @@ def test_walls_wider_than_the_cells_of_their_means_stay():
     sheets[:, 2] = 0.033 * (sheets[:, 2] > 0.5) + 0.02 * np.sin(5 * sheets[:, 0])
     points = means(sheets, 0.03)
     assert not noisy_samples(points, local_spacing(points)).any()
+
+
+def test_parts_far_from_each_other_are_looked_at_one_by_one(monkeypatch):
+    """The waves that tell cells apart grow in number with the extent of what is looked at."""
+    looked, waves = [], averaged._waves
+    monkeypatch.setattr(
+        averaged, "_waves", lambda x, frequencies: looked.append(len(frequencies)) or waves(x, frequencies)
+    )
+    for apart in (0.0, 60_000.0):
+        points = np.concatenate([MEANS["sphere"], MEANS["sphere"] + [apart, 0, 2.4]])
+        assert cells_of_means(points, local_spacing(points)) == pytest.approx(0.06, rel=0.01)
+    assert max(looked) < 10_000
