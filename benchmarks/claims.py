@@ -64,7 +64,8 @@ VAD at its defaults:
 run over Open3D's normals, orientation and Poisson, the median over cases of about 10,000 points timed with nothing else
 of the bench beside them (aim: {WITHIN} at most); *memory*: what a run takes over what Poisson's does, the median.
 {_spoiled(docs)}
-Defaults were chosen on the development cases, and the others have shown faults that were mended: none is held out.
+Defaults were chosen on the development cases, the `FOLDER`, which are not shipped; the others have shown faults that
+were mended: none is held out.
 """
 
 

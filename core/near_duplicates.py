@@ -11,6 +11,7 @@ there are of a point which was not given in much the same place.
 import numpy as np
 from scipy.spatial import KDTree
 
+from .lookup import mask_of
 from .parts import connected_parts
 from .progress import Progress
 
@@ -41,9 +42,7 @@ def find_near_duplicates(points: np.ndarray, progress=None) -> np.ndarray:
         if len(places) <= _NEIGHBOURS:  # so few that the spacing was that between their copies
             break
         kept = kept[places]
-    copies = np.ones(len(points), bool)
-    copies[kept] = False
-    return copies
+    return ~mask_of(kept, len(points))
 
 
 def _closeness(tree):

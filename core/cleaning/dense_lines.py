@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import KDTree
 
-from ..lookup import least_of_each
+from ..lookup import least_of_each, mask_of
 from ..neighbourhoods.lines import find_lines
 from ..parts import connected_parts
 from ..points import SPACING_NEIGHBOURS
@@ -36,9 +36,7 @@ def thinned_lines(points: np.ndarray, cell: float, progress=None) -> np.ndarray:
         if left.all():
             break
         rows = rows[left]
-    kept = np.zeros(len(points), bool)
-    kept[rows] = True
-    return kept
+    return mask_of(rows, len(points))
 
 
 def _may_be_dense(points, cell):
