@@ -85,7 +85,7 @@ def test_what_is_left_does_not_hang_on_order_and_is_said():
     assert set(one.source_index) == set(order[other.source_index])
     [said] = one.warnings
     assert said.startswith(f"{7200 - len(one.points)} of 7200 points dropped from lines")
-    assert done == {"outliers": 0}
+    assert done == {"outliers": 0, "thinned": 7200 - len(one.points)}
     kept, _ = clean(prepare_samples(points), Settings(outliers=False))
     assert len(kept.points) == len(points)
 
