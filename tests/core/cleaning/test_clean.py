@@ -13,7 +13,7 @@ def test_clean_samples_are_the_very_same():
     samples = prepare_samples(CLEAN)
     cleaned, done = clean(samples)
     assert cleaned is samples
-    assert done == {"outliers": 0}
+    assert done == {"outliers": 0, "thinned": 0}
 
 
 def test_without_strays_everything_is_as_if_they_had_never_been():
@@ -37,7 +37,7 @@ def test_switched_off_they_stay():
     points = np.vstack([CLEAN, STRAYS])
     cleaned, done = clean(prepare_samples(points), Settings(outliers=False, denoise=0))
     assert len(cleaned.points) == len(points)
-    assert done == {"outliers": 0}
+    assert done == {"outliers": 0, "thinned": 0}
 
 
 def test_noise_is_reported_in_input_units():
