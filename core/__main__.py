@@ -4,7 +4,7 @@ import os
 import signal
 import sys
 
-from .exit_status import BAD_INPUT, CANCELLED
+from .exit_status import BAD_INPUT, CANCELLED, REQUESTS_TO_END
 
 if sys.stderr is None:  # closed
     sys.stderr = open(os.devnull, "w")  # noqa: SIM115  until the end
@@ -19,7 +19,9 @@ def _end(signum, frame):
 
 
 try:
-    signal.signal(signal.SIGTERM, _end)
+    for number in REQUESTS_TO_END:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _end)
     from .cli import main
 
     status = main()

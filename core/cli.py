@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from .budget import SUITED, estimate_cost
 from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency, SettingsError, VADError
-from .exit_status import BAD_INPUT, CANCELLED, DONE, TOO_LARGE
+from .exit_status import BAD_INPUT, CANCELLED, DONE, REQUESTS_TO_END, TOO_LARGE
 from .field.grid import fit_grid
 from .io.atomic import together, writable_folder
 from .io.npz import write_arrays
@@ -47,7 +47,7 @@ exit status:
   0    done
   2    the scan, an option or the output folder cannot be used: one line on stderr says what and how to help it
   3    the run would need more memory than it may have: the line says what would help
-  130  cancelled by Ctrl-C or a request to end (SIGTERM); no file is left half-written
+  130  cancelled by Ctrl-C or a request to end (SIGTERM, SIGHUP); no file is left half-written
 
 With --json, stdout holds one JSON document and nothing else: the report, or {{"error": "..."}} beside the line on
 stderr.
@@ -75,7 +75,11 @@ number and no normal, with scan_ before its name where it has one of those two.
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) and return the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    previous = signal.signal(signal.SIGTERM, signal.default_int_handler) if _in_main_thread() else None
+    with _heeding(REQUESTS_TO_END, signal.default_int_handler):
+        return _status_of(arguments)
+
+
+def _status_of(arguments):
     try:
         given = _parsed(arguments)
         given.run(given)
@@ -94,9 +98,19 @@ def main(arguments: list[str] | None = None) -> int:
         if error.filename is None:  # standard output cannot be written to
             raise
         return _fail(f"{error.filename}: {error.strerror}; see that it is there and yours", BAD_INPUT, arguments)
+
+
+@contextmanager
+def _heeding(numbers, handler):
+    """Within, signals of these numbers go to the handler, but for those that are ignored, as Ctrl-C is for jobs in the
+    background and the end of a terminal where nohup is asked for."""
+    heeded = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    previous = {number: signal.signal(number, handler) for number in heeded} if _in_main_thread() else {}
+    try:
+        yield
     finally:
-        if _in_main_thread():
-            signal.signal(signal.SIGTERM, previous)
+        for number, before in previous.items():
+            signal.signal(number, before)
 
 
 def _in_main_thread():
@@ -229,7 +243,7 @@ def _spare(scan, digest, folder, arrays):
     report = report_of(folder / f"{scan.stem}{_REPORT}")
     if report:
         other, same = Path(report["scan"]), report.get("digest") == digest  # it may have been moved, or out of reach
-        with suppress(OSError):
+        with suppress(OSError, ValueError):  # nor need its name be one that this machine can write
             same = other.samefile(scan)
         if not same:
             raise InputError(f"{folder} holds the results of {other}, which have the same names; give another folder")
@@ -240,7 +254,8 @@ def _spare(scan, digest, folder, arrays):
 
 @contextmanager
 def _progress():
-    """A progress callback that draws a bar where stderr is a terminal, and cancels after the first Ctrl-C or SIGTERM.
+    """A progress callback that draws a bar where stderr is a terminal, and cancels after the first Ctrl-C or request to
+    end.
 
     The second stops at once, as it would any Python program.
     """
@@ -256,15 +271,11 @@ def _progress():
             bar.update(fraction - bar.n)
         return not pressed
 
-    numbers = (signal.SIGINT, signal.SIGTERM) if _in_main_thread() else ()
-    heeded = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]  # not in the background
-    previous = {number: signal.signal(number, interrupt) for number in heeded}
-    try:
-        with tqdm(total=1.0, bar_format=_BAR, miniters=0, disable=None, leave=False) as bar:
-            yield report
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
+    with (
+        _heeding((signal.SIGINT, *REQUESTS_TO_END), interrupt),
+        tqdm(total=1.0, bar_format=_BAR, miniters=0, disable=None, leave=False) as bar,
+    ):
+        yield report
 
 
 def _write(result: Reconstruction, carried, folder, scan, digest, gradient, arrays):

@@ -56,6 +56,7 @@ def register():
     presets.register()
     for handlers, handler in _HANDLERS:
         handlers.append(handler)
+    volume_files.delete_unused_of_module()
     bpy.app.timers.register(overlay.sync)  # scenes that show normals: they cannot be looked at while this runs
 
 

@@ -42,8 +42,10 @@ def objects_of(source: Source) -> list[bpy.types.Object]:
 
 
 def active_object(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active object, hidden as it may be: Blender's own `active_object` is None then, in a window."""
-    return context.active_object or context.view_layer.objects.active
+    """The active object, hidden as it may be: Blender's own `active_object` is None then, in a window, and the window's
+    where a script gives another view layer."""
+    active, layer = context.active_object, context.view_layer.objects
+    return active if active is not None and results.is_among(active, layer) else layer.active
 
 
 def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -63,7 +65,8 @@ def sources(context: bpy.types.Context) -> list[bpy.types.Object]:
 def _chosen(context):
     """The objects that are meant: those selected, the active one first. Where that is not selected, it stands alone if
     nothing that is can be read, or without a window, as scripts set the active object only."""
-    active, chosen = active_object(context), list(context.selected_objects)
+    active = active_object(context)
+    chosen = [obj for obj in context.selected_objects if results.is_among(obj, context.view_layer.objects)]
     if active is None or active in chosen:
         return sorted(chosen, key=lambda obj: obj != active)
     readable = [obj for obj in chosen if obj.type in READABLE]
@@ -218,7 +221,8 @@ def _world_cloud(obj, context, selected_only):
 def in_world(points: np.ndarray, obj: bpy.types.Object) -> np.ndarray:
     """Points (n,3) in the space of an object, in world space, (n,3) float64."""
     matrix = np.array(obj.matrix_world, np.float64)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    with np.errstate(invalid="ignore"):  # points that are not finite stay so
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _components(evaluated, geometry, selected_only):

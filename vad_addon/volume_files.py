@@ -5,7 +5,9 @@ import contextlib
 import os
 import shutil
 import time
+from itertools import count
 from pathlib import Path
+from uuid import uuid4
 
 import bpy
 from bpy.app.handlers import persistent
@@ -18,7 +20,9 @@ PACKAGE = __package__.rpartition(".")[0]
 
 _QUITTING = 20.0  # seconds that Blender may take to quit
 _SUBFOLDER = "vad_cache"  # so that clearing it deletes nothing else
-_STAYS = "The volume stays in the cache folder: "
+_STAYS, _LOST = "The volume stays in the cache folder: ", "The volume is lost: "
+_session = uuid4().hex[:8]  # the folder in the cache folder that this session's volumes wait in
+_taken = set()  # paths that this session made a file at, whose contents Blender may hold for as long as it runs
 _made = set()  # files of this session that may be out of use once its undo history is gone
 _copies = {}  # (file in the cache folder, when it was made, folder beside a .blend): its copy there
 _LONGEST = 200  # bytes of a file's name, of 255 that there may be, before its number
@@ -59,7 +63,7 @@ def file_of(volume: bpy.types.Volume) -> Path:
 def bring_along(blend: str = "", *_) -> None:
     """Before the file `blend` is saved (none: the startup file): what its volumes read in a cache folder is copied
     beside it, and they read the copies from then on. Where that fails they go on reading the cache folder, and the
-    results say so."""
+    results say so, as they do where another session has cleared that."""
     _before.clear()
     if not blend:
         return
@@ -67,8 +71,12 @@ def bring_along(blend: str = "", *_) -> None:
     here = bpy.data.is_saved and Path(bpy.data.filepath).parent == folder.parent
     for volume in bpy.data.volumes:
         path = file_of(volume)
-        cached = path.parent.name == _SUBFOLDER or not caches.isdisjoint(path.parents)
-        if volume.library is not None or not cached or not path.is_file():
+        cached = _SUBFOLDER in path.parts or not caches.isdisjoint(path.parents)
+        if volume.library is not None or not cached:
+            continue
+        _before[volume.session_uid] = volume.filepath
+        if not path.is_file():
+            _warn(volume, f"{_LOST}{path} is not there any more; press Extract Again")
             continue
         try:
             copy = _copy(path, folder)
@@ -76,7 +84,6 @@ def bring_along(blend: str = "", *_) -> None:
             _warn(volume, f"{_STAYS}{error}")
             continue
         _warn(volume, "")
-        _before[volume.session_uid] = volume.filepath
         volume.filepath = bpy.path.relpath(str(copy)) if here else str(copy)  # Blender makes it relative, if it is to
 
 
@@ -111,7 +118,7 @@ def _warn(volume, problem):
     for collection in bpy.data.collections:
         of_run = *collection.objects, *results.members(collection)
         if results.REPORT in collection and any(obj.data == volume for obj in of_run):
-            others = [line for line in results.warnings(collection) if not line.startswith(_STAYS)]
+            others = [line for line in results.warnings(collection) if not line.startswith((_STAYS, _LOST))]
             collection[results.WARNINGS] = "\n".join([*others, *([problem] if problem else [])])
 
 
@@ -126,7 +133,14 @@ def delete_unused(*_) -> None:
 def delete_unused_at_exit() -> None:
     """The same at the end of the session. Blender disables its extensions then; so does the user at times, who can
     undo and save afterwards, and nothing tells one from the other but how soon the end comes."""
+    atexit.unregister(delete_unused)
     atexit.register(_delete_if_soon, _made - used(), time.monotonic() + _QUITTING)
+
+
+def delete_unused_of_module() -> None:
+    """The same where Blender is a module of Python, which disables no extensions at its end."""
+    if bpy.app.module:
+        atexit.register(delete_unused)
 
 
 def _delete_if_soon(paths, deadline):
@@ -138,6 +152,8 @@ def _delete(paths):
     for path in paths:
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
+            if path.parent.name == _session:
+                path.parent.rmdir()  # once it is empty
 
 
 def blender_path(path: Path) -> str:
@@ -147,23 +163,28 @@ def blender_path(path: Path) -> str:
 
 def _reserve(name, folder, otherwise):
     """Create an empty file that nobody else uses. Names that exist already are counted up and never reused: an older
-    volume, an undone one or another .blend may read them. Names of objects may be longer than those of files."""
+    volume, an undone one or another .blend may read them. Nor are those of files that are gone: Blender goes on showing
+    what it once read at a path. Names of objects may be longer than those of files."""
     folder = writable_folder(folder, otherwise)
     stem = bpy.path.clean_name(name).encode()[:_LONGEST].decode(errors="ignore")
-    path, number = folder / f"{stem}.vdb", 0
-    while True:
-        try:
-            path.touch(exist_ok=False)
-        except FileExistsError:
-            number += 1
-            path = folder / f"{stem}_{number:03d}.vdb"
-        else:
-            return path
+    names = (f"{stem}_{number:03d}.vdb" if number else f"{stem}.vdb" for number in count())
+    path = next(path for path in map(folder.joinpath, names) if path.resolve() not in _taken and _made_now(path))
+    _taken.add(path.resolve())
+    return path
+
+
+def _made_now(path):
+    """Whether an empty file was made, as there was none."""
+    with contextlib.suppress(FileExistsError):
+        path.touch(exist_ok=False)
+        return True
+    return False
 
 
 def folder_in_use() -> Path:
-    """``//vad`` beside a saved .blend, else :func:`cache_folder`."""
-    return Path(bpy.path.abspath("//vad")) if bpy.data.is_saved else cache_folder()
+    """``//vad`` beside a saved .blend, else one of this session in :func:`cache_folder`: files that Blender recovers
+    after a crash may read what is gone, and should not find another scan's in its place."""
+    return Path(bpy.path.abspath("//vad")) if bpy.data.is_saved else cache_folder() / _session
 
 
 def cache_folder() -> Path:
@@ -196,7 +217,7 @@ def clear_cache() -> int:
     """
     kept = used() | _made
     freed = 0
-    for path in cache_folder().rglob("*.vdb"):
+    for path in list(cache_folder().rglob("*.vdb")):
         if path.resolve() not in kept:
             size = path.stat().st_size
             try:
@@ -204,4 +225,7 @@ def clear_cache() -> int:
             except OSError as error:
                 raise VADError(f"{path} cannot be deleted ({error.strerror}); delete it by hand") from error
             freed += size
+            if path.parent != cache_folder():
+                with contextlib.suppress(OSError):
+                    path.parent.rmdir()  # once it is empty
     return freed

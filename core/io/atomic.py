@@ -38,7 +38,7 @@ def _take_places(waiting):
     try:
         for _, path in reversed(waiting):
             if path.is_file():
-                with _errors_of(path):
+                with _errors_of(path), suppress(FileNotFoundError):  # another program took it away
                     before.append((_beside(path), path))
                     os.replace(path, before[-1][0])
         for temporary, path in waiting:
@@ -57,8 +57,9 @@ def _take_places(waiting):
 
 
 def _beside(path):
-    """A path of no file, in the same folder."""
-    return path.with_name(f".{uuid4().hex}{path.suffix}")
+    """A path of no file, in the same folder, and hidden; what is found there later was left by a program that had to
+    end at once."""
+    return path.with_name(f".unfinished-{uuid4().hex}{path.suffix}")
 
 
 @contextmanager

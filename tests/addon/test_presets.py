@@ -112,7 +112,7 @@ def test_the_cache_folder_may_be_another(blender, extension, add_mesh, sphere, t
     add_mesh("Scan", sphere)
     for _ in range(2):
         blender.ops.vad.reconstruct(resolution=16)
-    assert blender.data.volumes["Scan field"].filepath == str(folder / "Scan_001.vdb")
+    assert blender.data.volumes["Scan field"].filepath == str(files.folder_in_use() / "Scan_001.vdb")
     files._made.clear()
     blender.ops.vad.clear_cache()
     assert [path.name for path in tmp_path.rglob("*.vdb")] == ["mine.vdb", "Scan_001.vdb"]
@@ -120,17 +120,16 @@ def test_the_cache_folder_may_be_another(blender, extension, add_mesh, sphere, t
 
 def test_clearing_the_cache_spares_what_is_shown_and_what_undo_brings_back(blender, extension, add_mesh, sphere):
     files = extension("vad_addon.volume_files")
-    folder = files.cache_folder()
-    folder.mkdir(exist_ok=True)
-    for path in folder.glob("*.vdb"):
-        path.unlink()
-    (folder / "Other.vdb").write_text("of another session")
+    cache, folder = files.cache_folder(), files.folder_in_use()
+    (cache / "other").mkdir(parents=True, exist_ok=True)
+    (cache / "other" / "Other.vdb").write_text("of another session")
     add_mesh("Scan", sphere)
     blender.ops.ed.undo_push(message="before")
     for _ in range(2):
         blender.ops.vad.reconstruct("EXEC_DEFAULT", True, resolution=16)
     assert blender.ops.vad.clear_cache() == {"FINISHED"}
-    assert {path.name for path in folder.glob("*.vdb")} == {"Scan.vdb", "Scan_001.vdb"}
+    before, _ = sorted(folder.glob("*.vdb"))
+    assert list(cache.iterdir()) == [folder]
     blender.ops.ed.undo()
-    assert blender.data.volumes["Scan field"].filepath == str(folder / "Scan.vdb")
+    assert blender.data.volumes["Scan field"].filepath == str(before)
     assert blender.data.volumes["Scan field"].grids.load()

@@ -87,7 +87,7 @@ def unsaved(blender, files, add_mesh, sphere):
     add_mesh("Scan", sphere)
     blender.ops.vad.reconstruct(resolution=16)
     volume = blender.data.volumes["Scan field"]
-    assert Path(volume.filepath).parent == files.cache_folder()
+    assert Path(volume.filepath).parent.parent == files.cache_folder()
     return volume
 
 
@@ -186,6 +186,57 @@ def test_a_volume_that_cannot_be_copied_stays_and_that_is_said(blender, unsaved,
     assert not blender.context.scene.vad.result["vad_warnings"]
 
 
+def test_a_volume_that_another_session_cleared_is_said_to_be_lost(blender, unsaved, tmp_path):
+    Path(unsaved.filepath).unlink()
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    (warning,) = blender.context.scene.vad.result["vad_warnings"].splitlines()
+    assert warning.startswith("The volume is lost: ")
+    blender.ops.vad.reextract()
+    blender.ops.wm.save_mainfile()
+    assert blender.data.volumes["Scan field"].grids.load()
+    assert not blender.context.scene.vad.result["vad_warnings"]
+
+
+def test_after_a_save_where_all_failed_the_next_one_brings_the_volume_along(blender, unsaved, tmp_path):
+    cached = unsaved.filepath
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "vad").write_text("in the way")
+    (tmp_path / "full" / "scene.blend").mkdir()
+    with pytest.raises(RuntimeError):
+        blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "full" / "scene.blend"))
+    assert unsaved.filepath == cached
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    assert unsaved.grids.load()
+
+
+def box_shown(blender):
+    """Longest side of the field as Blender shows it."""
+    blender.context.view_layer.update()
+    return max(blender.data.objects["Scan field"].evaluated_get(blender.context.evaluated_depsgraph_get()).dimensions)
+
+
+@pytest.mark.parametrize("saved", [False, True])
+def test_each_run_shows_its_own_field_whatever_was_opened_between(blender, files, add_mesh, sphere, tmp_path, saved):
+    shown = []
+    add_mesh("Scan", sphere)
+    if saved:
+        blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    for size in (1.0, 3.0):
+        if saved:
+            blender.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+            scan = blender.data.objects["Scan"]
+            blender.context.view_layer.objects.active = scan
+        else:
+            blender.ops.wm.read_homefile(use_empty=True)
+            scan = add_mesh("Scan", sphere)
+        scan.scale = 3 * (size,)
+        blender.ops.vad.reconstruct(resolution=16)
+        blender.data.objects["Scan field"].hide_set(False)
+        shown.append(box_shown(blender))
+    assert shown[1] == pytest.approx(3 * shown[0], rel=0.1)
+
+
 def test_a_save_that_fails_changes_nothing(blender, unsaved, tmp_path):
     cached = unsaved.filepath
     (tmp_path / "scene.blend").mkdir()
@@ -220,6 +271,14 @@ END_OF_A_SESSION = """
             bpy.data.volumes.remove(bpy.data.volumes[name])
     vad_addon.unregister()
 """
+
+
+def test_of_a_script_go_those_that_no_save_read(bpy, tmp_path):
+    script = textwrap.dedent(END_OF_A_SESSION).replace("vad_addon.unregister()", "")
+    arguments = [str(ROOT), str(tmp_path / "scene.blend"), "20"]
+    ran = subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert names(tmp_path) == ["saved.vdb", "shown.vdb"]
 
 
 @pytest.mark.parametrize(("seconds", "left"), [(20, set()), (-1, {"updated.vdb"})], ids=["quits", "disabled"])

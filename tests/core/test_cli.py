@@ -12,6 +12,7 @@ import pytest
 from plyfile import PlyData
 
 from core import DistanceField, Mesh, MissingDependency, Reconstruction, Settings, cli
+from core.exit_status import REQUESTS_TO_END
 from core.io.atomic import atomic_path
 from core.io.openvdb_module import load_openvdb
 from core.io.ply import write_points
@@ -402,14 +403,16 @@ def test_a_scan_too_small_for_openvdb_has_the_rest_with_a_warning(capsys, tmp_pa
 
 @pytest.fixture
 def ctrl_c_heeded():
-    """Also where the tests run in the background of a shell that has it ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Also where the tests run in the background of a shell that has it ignored, or under nohup; requests to end too."""
+    numbers = signal.SIGINT, *REQUESTS_TO_END
+    before = {number: signal.signal(number, signal.default_int_handler) for number in numbers}
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.mark.usefixtures("ctrl_c_heeded")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, *REQUESTS_TO_END])
 @pytest.mark.parametrize("presses", [1, 2])
 def test_ctrl_c_cancels_and_writes_nothing(capsys, scan, calls, tmp_path, monkeypatch, presses, number):
     def reconstruct(points, settings, progress):
@@ -589,7 +592,7 @@ def test_a_real_process_from_scan_to_files(scan, tmp_path):
 
 
 @pytest.mark.usefixtures("ctrl_c_heeded")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, *REQUESTS_TO_END])
 def test_a_real_process_refuses_and_cancels(scan, tmp_path, number):
     command = [sys.executable, "-m", "core", "reconstruct", scan, "-o", str(tmp_path / "out")]
     done = subprocess.run([*command, "--resolution", "0"], cwd=ROOT, capture_output=True, text=True, timeout=60)
