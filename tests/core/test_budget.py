@@ -105,6 +105,7 @@ def test_noise_costs(monkeypatch):
     grid, spacing = fit_grid(points, 64), local_spacing(points)
     clean, noisy = (estimate_cost(spacing, grid, noisy=noisy).cpu_seconds for noisy in (False, True))
     assert noisy > 1.3 * clean
+    assert estimate_cost(spacing, grid, noisy=True, crowded=1.0).cpu_seconds == noisy  # noise looks like sheets
     moved = points + np.random.default_rng(0).normal(size=points.shape) * 0.03
     assert not looks_noisy(points, spacing)
     assert looks_noisy(moved, local_spacing(moved))

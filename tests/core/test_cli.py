@@ -403,7 +403,7 @@ def test_a_scan_too_small_for_openvdb_has_the_rest_with_a_warning(capsys, tmp_pa
 
 @pytest.fixture
 def ctrl_c_heeded():
-    """Also where the tests run in the background of a shell that has it ignored, or under nohup; requests to end too."""
+    """Also where the tests run in the background of a shell that has it ignored; requests to end under nohup."""
     numbers = signal.SIGINT, *REQUESTS_TO_END
     before = {number: signal.signal(number, signal.default_int_handler) for number in numbers}
     yield

@@ -75,3 +75,10 @@ def test_parts_far_from_each_other_are_looked_at_one_by_one(monkeypatch):
         points = np.concatenate([MEANS["sphere"], MEANS["sphere"] + [apart, 0, 2.4]])
         assert cells_of_means(points, local_spacing(points)) == pytest.approx(0.06, rel=0.01)
     assert max(looked) < 10_000
+
+
+def test_points_of_a_lattice_are_no_means():
+    """They share no cells wherever these are."""
+    x, y = np.indices((40, 40)).reshape(2, -1)
+    points = np.stack([x, y, np.rint(3 * np.sin(x / 7) + 2 * np.cos(y / 5))], axis=1)
+    assert cells_of_means(points, local_spacing(points)) is None

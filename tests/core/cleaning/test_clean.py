@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from core import Settings, reconstruct
 from core.cleaning.clean import clean
@@ -56,3 +57,11 @@ def test_a_run_returns_the_moved_samples_and_traces_them():
     assert moved.mean() > 0.01
     assert np.abs(shapes.sphere_distance(result.points)).mean() < 0.3 * np.abs(shapes.sphere_distance(noisy)).mean()
     assert result.report["cleaning"]["outliers"] == len(STRAYS) + len(noisy) - len(result.points)
+
+
+@pytest.mark.parametrize(("denoise", "told"), [("auto", 1), (0.5, 0)])
+def test_moves_that_were_asked_for_are_not_warned_of(denoise, told):
+    points = shapes.sphere(1500) + np.random.default_rng(0).normal(scale=0.01, size=(1500, 3))
+    cleaned, done = clean(prepare_samples(points), Settings(denoise=denoise))
+    assert done["mean_move"] > 0
+    assert len(cleaned.warnings) == told

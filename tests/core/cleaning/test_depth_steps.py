@@ -143,3 +143,18 @@ def test_terraces_become_one_sheet():
 def test_can_be_cancelled():
     with pytest.raises(Cancelled):
         between_steps(frame()[0], lambda fraction, text: fraction < 0.3)
+
+
+def test_no_point_moves_by_more_than_two_steps():
+    points = frame()[0]
+    some = np.arange(50, len(points), 400)
+    disparity = 1 / (STEP * points[some, 2])
+    points[some] *= (disparity / np.maximum(disparity - 10, 3))[:, None]  # ten steps behind those around
+    moved, found = between_steps(points)
+    assert np.linalg.norm(found.seen(moved) - found.seen(points), axis=1).max() <= 2 + 1e-9
+
+
+def test_points_behind_the_camera_as_well_are_of_none():
+    before = frame()[0]
+    before = before[before[:, 0] > 0]
+    assert find_frame(np.vstack([before, before * [1, 1, -1]])) is None

@@ -318,3 +318,12 @@ def test_sparse_samples_of_a_thin_wall_are_no_strays(gap):
     sparse[:, :2] += np.random.default_rng(0).normal(scale=0.01, size=(len(sparse), 2))
     faces = [dense, dense + np.array([0, 0, gap]), sparse, sparse + np.array([0.04, 0.04, gap])]
     assert find_outliers(np.concatenate(faces)).sum() < 0.1 * 2 * len(sparse)
+
+
+@pytest.mark.parametrize("beyond", [4, 6])
+def test_lonely_samples_in_line_with_a_wire_stay(beyond):
+    """The end of a wire that is sampled less there."""
+    along = np.linspace(0, 1, 60)
+    side = np.linspace(0, 1, 4)
+    wires = np.array([[x, y, z] for y in side for z in side for x in (*along, 1 + beyond * along[1])])
+    assert not find_outliers(wires).any()

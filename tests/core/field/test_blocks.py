@@ -174,3 +174,11 @@ def test_gradients_are_those_of_the_dense_array_but_at_the_end_of_the_band():
 def test_a_table_has_room_for_every_node(shape):
     table = np.array(table_shape(shape))
     assert ((SIDE * table >= shape) & (SIDE * (table - 1) < shape)).all()
+
+
+def test_constant_blocks_count_as_whole_ones():
+    mask = blocks_of((24, 24, 24), np.array([13]), np.False_)
+    mask.outer[0] = True  # nine blocks along one side
+    labels, n = regions(mask)
+    assert n == 1
+    assert counts(labels)[1] == 9 * SIDE**3

@@ -214,3 +214,11 @@ def test_poisson_agrees_with_transport(points):
     assert np.percentile(apart, 95) < 1.0
     near = run.field.values < run.field.spacing
     assert np.mean(run.field.values[near] == other.field.values[near]) > 0.998  # but where feet close a crack
+
+
+def test_poisson_is_nowhere_farther_than_the_nearest_sample():
+    points = shapes.hemisphere(500)
+    field = reconstruct(points, Settings(resolution=32, integration="poisson", surface="none")).field
+    nodes = field.origin + field.spacing * np.stack(np.indices(field.values.shape), axis=-1)
+    farthest = KDTree(points).query(nodes[::2, ::2, ::2])[0]
+    assert ((field.values[::2, ::2, ::2] - farthest) / field.spacing).max() < 1e-4

@@ -1,5 +1,6 @@
 import os
 import resource
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +54,14 @@ def test_files_written_together_take_their_places_at_the_end_or_not_at_all(tmp_p
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file.txt": "old", "report.txt": "old"}
     write_both(tmp_path, "new")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file.txt": "new", "report.txt": "new"}
+
+
+def test_what_tells_of_the_others_goes_before_they_do(tmp_path, monkeypatch):
+    write_both(tmp_path, "old")
+    moved, replace = [], os.replace
+    monkeypatch.setattr(os, "replace", lambda one, other: moved.append(Path(one).name) or replace(one, other))
+    write_both(tmp_path, "new")
+    assert [name for name in moved if not name.startswith(".")] == ["report.txt", "file.txt"]
 
 
 @pytest.mark.parametrize(("taken", "other"), [("file.txt", "report.txt"), ("report.txt", "file.txt")])

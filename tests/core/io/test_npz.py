@@ -96,3 +96,11 @@ def test_a_band_is_written_in_blocks(tmp_path):
     np.testing.assert_allclose(np.linalg.norm(arrays["gradient"][known], axis=-1), 1, atol=0.1)
     assert known.sum() > 100
     assert np.abs(shapes.sphere_distance(arrays["foot"])).max() < 0.1 * run.field.spacing
+
+
+def test_signed_distances_are_said_to_be_so(tmp_path):
+    result = reconstruct(shapes.sphere(400), Settings(resolution=24, surface="signed"))
+    write_arrays(tmp_path / "ball.npz", result)
+    with np.load(tmp_path / "ball.npz") as arrays:
+        assert arrays["signed"]
+        assert arrays["values"].min() < -0.9

@@ -58,7 +58,9 @@ def test_what_a_gradient_says_along_an_axis_does_not_matter():
         return value, gradient + 5 * axes
 
     start = random_axes(50, 6)
-    np.testing.assert_allclose(minimise(stretched, start)[0], minimise(away_from_targets, start)[0], atol=1e-6)
+    for steps, error in ((5, 1e-9), (20, 1e-9), (MAX_STEPS, 1e-6)):  # on the way as well
+        one, other = (minimise(energy, start, max_steps=steps)[0] for energy in (stretched, away_from_targets))
+        np.testing.assert_allclose(one, other, atol=error)
 
 
 def test_cancels():

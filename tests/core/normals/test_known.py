@@ -49,3 +49,7 @@ def test_what_cannot_be_used_is_refused(axes, confidence, message):
 def test_what_is_no_pair_is_refused(known):
     with pytest.raises(InputError, match="no pair of arrays"):
         known_normals(known, 400, np.arange(400))
+
+
+def test_confidence_is_taken_to_its_limits():
+    assert_array_equal(known_normals((np.eye(3), [-0.5, 0.5, 2]), 3, np.arange(3))[1], [0, 0.5, 1])

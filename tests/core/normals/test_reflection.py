@@ -5,7 +5,7 @@ from core import Cancelled
 from core.normals.adam import minimise
 from core.normals.energy import NormalEnergy
 from core.normals.mirrors import Mirrors
-from core.normals.reflection import reflection_sweeps
+from core.normals.reflection import MAX_SWEEPS, reflection_sweeps
 from core.points import local_spacing
 from core.voronoi.bisectors import bisector_samples
 from core.voronoi.facets import voronoi_facets
@@ -218,3 +218,22 @@ def test_jump_of_the_projection_distance_is_bounded_by_the_mirror_misfit(both):
     cosine = np.einsum("ki,ki->k", start[energy.site], image)
     bound = np.linalg.norm(energy.from_site, axis=1) * np.sqrt(2 * (1 - cosine**2))
     assert (np.abs(height[0] - height[1]) <= bound + 1e-4).all()
+
+
+def test_neighbours_are_cut_only_where_enough_are_left():
+    mirrors = mirrors_of(shapes.sphere(200))
+    own = mirrors.site == 0
+    lightest = np.flatnonzero(own)[mirrors.weight[own].argmin()]
+    cut = own & (np.arange(len(own)) != lightest)
+    assert mirrors.weight[lightest] < 0.1
+    np.testing.assert_array_equal(mirrors.without(cut).weight[own], mirrors.weight[own])
+    heaviest = np.flatnonzero(own)[mirrors.weight[own].argmax()]
+    fewer = mirrors.without(np.arange(len(own)) == heaviest)
+    assert fewer.weight[heaviest] == 0
+    assert fewer.weight[own].sum() == pytest.approx(1)
+
+
+def test_where_axes_go_to_and_fro_the_sweeps_end_as_well():
+    """Among points without a surface, where axes alternate without an end but for their inertia."""
+    points = np.random.default_rng(0).random((300, 3))
+    assert sweeps(points)[2] < MAX_SWEEPS

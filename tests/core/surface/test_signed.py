@@ -176,6 +176,13 @@ def test_a_spanned_opening_is_smooth():
     assert set(mesh.edge_counts()[1]) == {2}
 
 
+def test_the_place_named_is_at_the_opening():
+    points = shapes.sphere(2000)
+    with pytest.raises(InputError, match=r"near \(") as told:
+        signed(points[points[:, 2] < 0.9], resolution=48, bridge=1.5)
+    assert float(re.search(r"near \(.*?, .*?, (.*?)\)", str(told.value))[1]) > 0.85
+
+
 def test_a_wall_inside_is_refused():
     with pytest.raises(InputError, match=r"inner walls.*set surface to single"):
         signed(np.concatenate([shapes.cube(2400), shapes.square(400)]))

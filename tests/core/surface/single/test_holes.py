@@ -66,6 +66,13 @@ def test_fillings_are_wound_as_the_faces_around(plane, turn):
     assert mesh.edges.alike.all()
 
 
+@pytest.mark.parametrize(("below", "loops"), [(0.1, 3), (0.4, 2)])
+def test_a_hole_over_another_sheet_close_by_is_none(plane, below, loops):
+    """It would be there twice."""
+    mesh = lattice(block(4)).joined(lattice(set(), -below * CELL))
+    assert fill_pinholes(mesh, plane, CELL).border_loops() == loops
+
+
 def test_a_loop_longer_than_64_edges_stays(plane):
     mesh = lattice(block(17, 5))
     assert fill_pinholes(mesh, plane, CELL).border_loops() == 2
