@@ -72,6 +72,23 @@ def work_through(work: Callable, chunks: Iterable) -> None:
         pass
 
 
+@contextmanager
+def beside(work: Callable) -> Iterator[Callable]:
+    """Does `work`, a function without arguments, while the block goes on in the calling thread; gives a function that
+    waits for what it returns. It should report no progress, as that would come from another thread."""
+    with nullcontext(_kept.pool) if hasattr(_kept, "pool") else ThreadPoolExecutor(1) as pool:
+        with starting_threads():
+            begun = pool.submit(work)
+        try:
+            yield begun.result
+        except BaseException:
+            begun.cancel()
+            raise
+        finally:
+            if not begun.cancelled():
+                wait([begun])
+
+
 def side_by_side(*looks: Callable) -> list:
     """What functions without arguments return, called at the same time."""
     return [found for _, found in in_order(lambda look: look(), looks)]

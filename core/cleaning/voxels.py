@@ -88,7 +88,8 @@ def find_voxels(points, seed: int = 0) -> Voxels | None:
     beside = k_nearest(KDTree(points), points[rows], _NEAREST + 1)[1][:, 1:]
     offset = (points[beside] - points[rows, None]).reshape(-1, 3)
     length = np.linalg.norm(offset, axis=1)
-    twins = KDTree(offset).query(offset, k=_TWINS + 1, workers=-1)[0][:, _TWINS] < _ALIKE * np.median(length)
+    alike = _ALIKE * np.median(length)
+    twins = np.isfinite(KDTree(offset).query(offset, k=[_TWINS + 1], distance_upper_bound=alike, workers=-1)[0][:, 0])
     edges = _shortest_independent(offset[twins][np.argsort(length[twins], kind="stable")])
     if edges is None:
         return None

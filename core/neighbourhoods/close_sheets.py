@@ -8,7 +8,7 @@ sheet, and the distance of the sheets on another. The two are told apart where a
 import numpy as np
 
 from ..linalg import dots, medians
-from ..parallel import work_through
+from ..parallel import even_chunks, work_through
 from ..progress import Progress
 from .cloud import Cloud
 
@@ -37,8 +37,8 @@ def sheet_room(cloud: Cloud, progress=None) -> np.ndarray:
         several = two.mean(axis=1) > _SHARE
         room[part][several] = medians(np.where(two, around, np.nan)[several])
 
-    work_through(look, progress.part(0.0, 0.9).chunks(len(cloud), _CHUNK))
-    work_through(agree, progress.part(0.9, 1.0).chunks(len(cloud), _CHUNK))
+    work_through(look, even_chunks(len(cloud), _CHUNK, progress.part(0.0, 0.9)))
+    work_through(agree, even_chunks(len(cloud), _CHUNK, progress.part(0.9, 1.0)))
     return room
 
 

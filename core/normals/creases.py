@@ -37,7 +37,7 @@ _LEAST_TURN = 0.2  # radians
 _ROUNDS, _SWEEPS = 4, 6
 _ACROSS = 0.2  # sine between axis and image, from which neighbours beside a crease are on different sheets
 _RISEN = 0.4  # sine by which they rise out of the plane, from which they are, too: the inside of a wedge lies between
-_CHUNK = 1024  # samples
+_CHUNK = 256  # samples
 
 
 def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), progress=None):

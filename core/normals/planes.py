@@ -21,7 +21,7 @@ _INSIDE, _EXACTLY = 0.007, 0.001  # of the Gaussian of the sine by which neighbo
 _SHARE = 0.35  # least share of the neighbours, by weight, in a plane
 _GAIN = 0.1  # by which it must exceed the share in that of the present axis
 _FEWEST = 6.0  # neighbours that must lie in it
-_CHUNK = 1024  # samples
+_CHUNK = 256  # samples
 
 
 def neighbourhoods(row, points, spacing, tree: KDTree):
@@ -49,7 +49,7 @@ def onto_planes(points, spacing, tree: KDTree, normals, suspect, leaning):
 
 
 def parts_of(chosen):
-    """The numbers of the samples `chosen`, (n,) bool, in parts of at most 1024."""
+    """The numbers of the samples `chosen`, (n,) bool, in parts of at most 256."""
     row = np.flatnonzero(chosen)
     return np.split(row, range(_CHUNK, len(row), _CHUNK))
 

@@ -2,12 +2,14 @@
 
 import os
 import threading
+import time
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.parallel import _FEW, _HELD, even_chunks, in_order, over_rows, workers
+from core.parallel import _FEW, _HELD, beside, even_chunks, in_order, over_rows, workers
 from core.progress import Progress
 
 CORES = os.cpu_count() or 1
@@ -119,6 +121,51 @@ def test_what_waits_for_a_thread_is_not_begun_once_something_was_raised():
 def test_what_work_raises_comes_out():
     with pytest.raises(ZeroDivisionError):
         list(in_order(lambda x: 1 / x, [1, 0, 1]))
+    with beside(lambda: 1 / 0) as result:
+        pass
+    with pytest.raises(ZeroDivisionError):
+        result()
+
+
+@pytest.mark.parametrize("shared", [workers, nullcontext])
+def test_work_beside_a_block_is_done_meanwhile_and_ends_with_it(shared):
+    met, before = threading.Barrier(2, timeout=20), threading.active_count()
+
+    def work():
+        met.wait()
+        return [y for _, y in in_order(abs, range(-4 * CORES, 0))], threading.current_thread()
+
+    with shared():
+        with beside(work) as result:
+            met.wait()  # both are at it
+            assert [y for _, y in in_order(abs, range(4 * CORES))] == list(range(4 * CORES))
+        found, thread = result()
+        assert found == list(range(4 * CORES, 0, -1))
+        assert thread is not threading.current_thread()
+    assert threading.active_count() == before
+
+
+def test_work_that_waits_for_a_thread_is_done_though_the_block_is_over():
+    with workers():
+        busy = in_order(lambda _: time.sleep(0.1), range(2 * CORES))
+        next(busy)
+        with beside(lambda: "done") as result:
+            pass
+        assert result() == "done"
+        list(busy)
+
+
+def test_where_the_block_raises_work_beside_it_ends_first():
+    done, go_on = [], threading.Event()
+
+    def run():
+        with beside(lambda: go_on.wait(20) and done.append(True)):
+            threading.Timer(0.2, go_on.set).start()
+            raise RuntimeError("cancelled")
+
+    with pytest.raises(RuntimeError, match="cancelled"):
+        run()
+    assert done
 
 
 @pytest.mark.parametrize("count", [1, _FEW, _FEW + 1, 8192, 8193, 20_000, 50_000, 1_000_000])

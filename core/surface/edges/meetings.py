@@ -15,7 +15,7 @@ from ...field.local_surface import LocalSurface
 from ...field.projection import MEMBER, TRUSTED, membership
 from ...linalg import cross, dots, links_in_common, row_dots
 from ...lookup import mask_of, numbered
-from ...parallel import even_chunks, in_order, over_rows
+from ...parallel import even_chunks, in_order, over_rows, work_through
 from ...parts import connected_parts
 from ...progress import Progress
 from .sheets import SIDE_BY_SIDE
@@ -29,7 +29,7 @@ _PAST = 1.0  # local spacings along itself that a sheet goes on, on either side 
 _PARTED = 0.3  # local spacings, off the plane of one of three sheets that end at a line, samples of the others
 _THIRD = 4  # samples of the third, at least
 _LEVEL = 0.3  # volume that the normals of such sheets span, at most
-_CHUNK = 8192  # samples
+_CHUNK, _FOLLOWED = 8192, 512  # samples, and those whose sheets are followed, at a time
 _SHARE, _LEAST = 0.3, 12  # of the pairs of unlike samples in a neighbourhood, on two sheets where these meet
 _WEAK, _NEXT = 0.15, 8  # that share where samples connect to such ones, by so many of the nearest each
 FEW = 0.005  # of all samples, at meetings, beside others, or that show no line: as few may be chance
@@ -218,7 +218,7 @@ def _followed(own, surface):
         sure = (member > _STRAIGHT) & (surface.confidence[near] >= _LINKED)
         followed[part] = np.where(sure & (away <= _FAR * surface.spacing[own[part], None]), near, -1)
 
-    over_rows(look, len(own), _CHUNK)
+    work_through(look, Progress().chunks(len(own), _FOLLOWED))
     return followed
 
 

@@ -10,6 +10,7 @@ from ...field.blocks import Blocks
 from ...field.grid import ADJACENT, Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
+from ...parallel import beside
 from ...parts import extents, near_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
@@ -140,13 +141,19 @@ def sheet_of_crossings(
     """
     progress, meetings = Progress.of(progress), crossings.meetings
     passing = meetings.passing
+    shown = passing.any() and not meetings.side_by_side
     found = dual_contour(crossings, surface, grid, progress.part(0.0, 0.3))
-    sheet, unoriented = _finished(found, passing, surface, grid, progress.part(0.3, 0.5))
+    sheet, unoriented = orient(mended(found, surface, grid.spacing))
+    if unoriented and crossings.normal.any() and not shown:
+        with beside(lambda: _sharp(sheet, passing, surface, grid, Progress())) as sharp:
+            two_sides()
+        sheet = sharp()
+    else:
+        sheet = _sharp(sheet, passing, surface, grid, progress.part(0.3, 0.5))
     if not crossings.normal.any():
         return sheet, unoriented
     lines = _lines(sheet)
     chance = not (unoriented or meetings.side_by_side) and _are_short(lines, grid)
-    shown = passing.any() and not meetings.side_by_side
     if not chance and (shown or not unoriented):
         return sheet, unoriented
     signed = two_sides()
@@ -198,8 +205,13 @@ def _finished(mesh, passing, surface, grid, progress):
     """A sheet mended, wound alike, and sharp where sheets meet or fold, and the number of edges across which it is not
     wound alike."""
     sheet, unoriented = orient(mended(mesh, surface, grid.spacing))
+    return _sharp(sheet, passing, surface, grid, progress), unoriented
+
+
+def _sharp(sheet, passing, surface, grid, progress):
+    """A sheet with its junctions and creases made sharp."""
     sheet = onto_junctions(sheet, surface, grid.spacing, progress.part(0.0, 0.5))
-    return finished(sheet, passing, surface, grid.spacing, progress.part(0.5, 1.0)), unoriented
+    return finished(sheet, passing, surface, grid.spacing, progress.part(0.5, 1.0))
 
 
 def mended(mesh: Mesh, surface: LocalSurface, cell: float) -> Mesh:
