@@ -23,11 +23,12 @@ _FREE_SHARE = 0.7  # of the free memory, where no limit is set
 SUITED = 1.5  # cells between points that show their detail; see docs/scale.md
 _BAND = 4.0  # cells, the band that is advised at least
 
-# Fitted to 154 runs over 100 to 290,000 samples at resolutions of 64 to 512, in a band or not, which held .55 to 1.6
-# times as much, nine tenths of them .8 to 1.4: the Voronoi diagram by samples, the field by nodes, the meshes by nodes
-# and by squared cells of the surface, in a band both by the latter. One is over before the next begins.
-_MEMORY = {"diagram": 33.0, "sample": 2e-3, "field": 20.0, "node": 31e-6, "meshes": 52.0, "held node": 2.2e-6}  # MiB
-_SQUARED_CELL = 4.6e-3  # MiB
+# Fitted to runs over 100 to 400,000 samples at resolutions of 64 to 512, in a band or not. Of 84 in the whole box over
+# 3,000 samples and more each held .72 to 1.18 times as much, nine tenths of them .79 to 1.09: the Voronoi diagram by
+# samples, the field by nodes, the meshes by nodes and by squared cells of the surface, in a band both by the latter,
+# and both beside what is known of each sample. One is over before the next begins.
+_MEMORY = {"diagram": 33.0, "sample": 1.5e-3, "field": 20.0, "node": 31e-6, "meshes": 52.0, "held node": 2.2e-6}  # MiB
+_SQUARED_CELL, _HELD_SAMPLE = 4.6e-3, 0.7e-3  # MiB
 _BAND_MEMORY = {"field": 110.0, "surface": 3.4e-3}  # MiB
 _ENERGY = {"sample": 31e-3, "torch": 180.0}  # MiB, with the solver of that name: by samples, and for that library
 _POISSON_NODE = 40e-6  # MiB
@@ -142,13 +143,13 @@ def free_memory_mb() -> float:
 def _memory(samples, area, nodes, settings):
     """MiB of a run over a surface of `area` squared cells: of its most costly stage."""
     least, each = _by_samples(settings)
-    diagram, by_cores = least + each * samples, _by_cores()
+    diagram, held = least + each * samples, _HELD_SAMPLE * samples
     if settings.band is not None:
-        return by_cores + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY["surface"] * area)
+        return _by_cores() + max(diagram, _BAND_MEMORY["field"] + _BAND_MEMORY["surface"] * area + held)
     node = _POISSON_NODE if settings.integration == "poisson" else _MEMORY["node"]
     field = _MEMORY["field"] + node * nodes
     meshes = _MEMORY["meshes"] + _MEMORY["held node"] * nodes + _SQUARED_CELL * area
-    return by_cores + max(diagram, field, meshes * (settings.surface != "none"))
+    return _by_cores() + max(diagram, held + max(field, meshes * (settings.surface != "none")))
 
 
 def _by_cores():
