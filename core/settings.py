@@ -156,8 +156,8 @@ class Settings:
     )
     memory_limit: float | str = _option(
         "auto",
-        "A run that is estimated to need more memory than this is refused once its points are cleaned. With auto the limit is "
-        "70 % of the memory that is free",
+        "A run that is estimated to need more memory than this is refused once its points are cleaned. With auto the "
+        "limit is 70 % of the memory that is free",
         limits=(64.0, 2.0**22),
         word="auto",
         unit="MiB",
