@@ -38,7 +38,9 @@ _OFF, _AROUND = 0.02, 8  # cells, by which a foot is off the plane of a sample o
 _TURNED = 8  # steps along edges from odd faces, up to where edges are turned over
 _CHUNK = 1 << 15  # cells
 
-_EDGES = np.array([(low, low + step) for step in (4, 2, 1) for low in range(8) if not low & step])  # as CORNERS are
+_EDGES = np.array(
+    [(low, low + step) for step in (4, 2, 1) for low in range(8) if not low & step]
+)  # of CORNERS, by axis
 
 
 @dataclass(frozen=True)
@@ -171,13 +173,13 @@ def _vote(band, corner, surface, grid, progress):
     chunks = even_chunks(corner.shape[1], _CHUNK, progress.part(0.3, 1.0))
     cast = in_order(lambda part: _ballots(steps.take(corner[:, part], axis=1), grid.spacing), chunks)
     ballots = zip((np.empty((12, 0)),) * 3, *(found for _, found in cast), strict=True)
+    lowest = [corner[edges].reshape(-1) for edges in np.split(_EDGES[:, 0], 3)]
 
     def count(ballot):
         by_axis = np.concatenate(ballot, axis=1).reshape(3, -1)
         counts = [np.bincount(low, along, len(band.node)) for low, along in zip(lowest, by_axis, strict=True)]
         return np.stack(counts, axis=1).reshape(-1)
 
-    lowest = [corner[edges].reshape(-1) for edges in np.split(_EDGES[:, 0], 3)]
     vote, weight, share = (found for _, found in in_order(count, ballots))
     voted = np.flatnonzero(weight)
     return voted, vote[voted], share[voted] / weight[voted]

@@ -146,7 +146,7 @@ def sheet_of_crossings(
     sheet, unoriented = orient(mended(found, surface, grid.spacing))
     if unoriented and crossings.normal.any() and not shown:
         with beside(lambda: _sharp(sheet, passing, surface, grid, Progress())) as sharp:
-            two_sides()
+            two_sides()  # which are asked for below, whatever the sheet is like
         sheet = sharp()
     else:
         sheet = _sharp(sheet, passing, surface, grid, progress.part(0.3, 0.5))
