@@ -72,7 +72,7 @@ def bring_along(blend: str = "", *_) -> None:
     for volume in bpy.data.volumes:
         path = file_of(volume)
         cached = _SUBFOLDER in path.parts or not caches.isdisjoint(path.parents)
-        if volume.library is not None or not cached:
+        if volume.library is not None or not cached or path.parent == folder.resolve():
             continue
         _before[volume.session_uid] = volume.filepath
         if not path.is_file():

@@ -117,6 +117,14 @@ def test_what_lies_in_the_cache_folder_of_before_comes_along(blender, unsaved, t
     assert unsaved.grids.load()
 
 
+def test_beside_a_file_in_a_folder_called_like_the_cache_nothing_is_copied_again(blender, unsaved, tmp_path):
+    (tmp_path / "vad_cache").mkdir()
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "vad_cache" / "scene.blend"))
+    blender.ops.wm.save_mainfile()
+    assert unsaved.filepath == "//vad/Scan.vdb"
+    assert names(tmp_path / "vad_cache") == ["Scan.vdb"]
+
+
 def test_what_undo_brings_back_from_the_cache_comes_along_again(blender, unsaved, tmp_path):
     cached = unsaved.filepath
     blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
