@@ -10,12 +10,12 @@ from .given_arrays import finite_points, points_array, span_of
 from .near_duplicates import find_near_duplicates
 from .progress import Progress
 from .spatial_order import spatial_order
+from .trees import nearest_others
 
 MINIMUM_SAMPLES = 4
 SPACING_NEIGHBOURS = 6
 _SMALLEST, _LARGEST = 1e-30, 1e30  # span of the points, input units
 _QUANTUM = 2.0**-53  # of coordinates in the unit frame: squares of distances are then zero only where those are
-_CHUNK = 16384  # samples
 _ROUNDED, _ODD = 0.02, 0.25  # steps of coordinates, local spacings, that are told; share of odd numbers of these steps
 _FLATNESS = 1e-9  # relative to the longest side; thinner than this counts as a line
 
@@ -133,11 +133,7 @@ def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
     """rho, (n,) float64 in the units of `points`, (n,3) array-like: mean distance of each sample to its 6 nearest
     (fewer if n < 7). Raises :class:`InputError` for fewer than two points, or any that are not finite."""
     points = finite_points(points, least=2)
-    k = min(SPACING_NEIGHBOURS, len(points) - 1)
-    tree, spacing = KDTree(points), np.empty(len(points))
-    for part in Progress.of(progress).chunks(len(points), _CHUNK):
-        spacing[part] = tree.query(points[part], k=k + 1, workers=-1)[0][:, 1:].mean(axis=1)
-    return spacing
+    return nearest_others(KDTree(points), SPACING_NEIGHBOURS, Progress.of(progress))[0].mean(axis=1)
 
 
 def rounding_warning(points: np.ndarray, spacing: float) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from ..neighbourhoods.lines import find_lines
 from ..parts import connected_parts
 from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
+from ..trees import nearest_others
 
 _APART = 1.0  # cells along a line, that samples are left apart at most
 _ACROSS = 1 / 6  # of the way to the next line, at most; by a fourth, thin limbs in slices fall apart
@@ -48,10 +49,8 @@ def _may_be_dense(points, cell):
 def _fewer(points, cell, progress):
     """Which samples are left, (n,) bool, up to 4 times as far apart as they were."""
     n, tree = len(points), KDTree(points)
-    nearest, spacing, kept = np.empty((n, SPACING_NEIGHBOURS), np.int64), np.empty(n), np.ones(n, bool)
-    for part in progress.part(0.0, 0.5).chunks(n, _CHUNK):
-        distance, other = tree.query(points[part], k=SPACING_NEIGHBOURS + 1, workers=-1)
-        nearest[part], spacing[part] = other[:, 1:], distance[:, 1:].mean(axis=1)
+    distance, nearest = nearest_others(tree, SPACING_NEIGHBOURS, progress.part(0.0, 0.5))
+    kept, spacing = np.ones(n, bool), distance.mean(axis=1)
     lines, step = find_lines(points, spacing, nearest), _STEP * spacing
     own, apart = np.flatnonzero(lines.number >= 0), np.zeros(n)
     for part in progress.part(0.5, 1.0).chunks(len(own), _CHUNK):

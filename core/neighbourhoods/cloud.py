@@ -7,10 +7,10 @@ from scipy.spatial import KDTree
 
 from ..linalg import tangent_frames
 from ..progress import Progress
+from ..trees import nearest_others
 from .lines import Lines, find_lines
 
 _NEIGHBOURS = 16  # of a sample, that its patch is fitted to
-_CHUNK = 16384  # samples
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,7 @@ class Cloud:
     def of(cls, points, normals, spacing, progress=None) -> "Cloud":
         """With 16 neighbours, or all others where there are fewer."""
         tree = KDTree(points)
-        k = min(_NEIGHBOURS, tree.n - 1) + 1
-        neighbours = np.empty((tree.n, k - 1), np.int64)
-        for part in Progress.of(progress).chunks(tree.n, _CHUNK):
-            neighbours[part] = tree.query(tree.data[part], k=k, workers=-1)[1][:, 1:]
+        neighbours = nearest_others(tree, _NEIGHBOURS, Progress.of(progress))[1]
         lines = find_lines(points, spacing, neighbours)
         return cls(points, normals, spacing, tangent_frames(normals), neighbours, tree, lines)
 

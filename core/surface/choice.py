@@ -16,7 +16,7 @@ from .double.double_cover import DENSE, double_cover
 from .double.ridges import ridge_share
 from .edges.meetings import Meetings
 from .mesh import Mesh
-from .meshing.misfit import BETTER, ROUGH, SHOWN, chamfer, misfit
+from .meshing.misfit import BETTER, ROUGH, SHOWN, Misfit, chamfer, misfit
 from .meshing.pieces import pieces_touch, pieces_with_samples
 from .signs.sides import may_be_closed
 from .single.single_layer import SingleLayer
@@ -50,7 +50,7 @@ class Choice:
         return self.single.meetings
 
     @cached_property
-    def best_single(self) -> tuple[Mesh, int, tuple[float, float]]:
+    def best_single(self) -> tuple[Mesh, int, Misfit]:
         """The single layer for users, the number of its edges that cannot be wound alike, and :func:`misfit` of it."""
         found = self.single.told_apart()
         sheet, unoriented = found.with_thin_walls()
@@ -64,8 +64,8 @@ class Choice:
         worst, missed = self.best_single[2]
         if (worst <= 1 and missed <= _MISSED) or self.is_of_sheet:
             return False
-        covers_worst, covers_missed = self.extracted_fit
-        return (worst > 1 and covers_worst < BETTER * worst) or missed - covers_missed > _MISSED
+        cover = self.extracted_fit
+        return (worst > 1 and cover.worst < BETTER * worst) or missed - cover.missed > _MISSED
 
     @cached_property
     def cover(self) -> Mesh:
@@ -73,7 +73,7 @@ class Choice:
         return self.both_sides if self.is_of_sheet else self.extracted
 
     @cached_property
-    def cover_fit(self) -> tuple[float, float]:
+    def cover_fit(self) -> Misfit:
         """:func:`misfit` of the double cover."""
         if not self.is_of_sheet:
             return self.extracted_fit
@@ -86,8 +86,8 @@ class Choice:
         """
         looked = self._may_be_sheet()
         if looked and self._is_whole():
-            (worst, _), _ = side_by_side(lambda: self.single.misfit, lambda: self.both_sides)
-            if worst <= 1 and not self.single.is_rough:
+            fit, _ = side_by_side(lambda: self.single.misfit, lambda: self.both_sides)
+            if fit.worst <= 1 and not self.single.is_rough:
                 return True
         return (looked or self._is_rough()) and self._is_closer()
 
@@ -96,13 +96,13 @@ class Choice:
         whether it is rough, so that it may merge what the single layer parts."""
         if self.local.spacing_in_cells(self.grid) > SPARSEST:
             return False
-        worst = self.extracted_fit[0]
+        worst = self.extracted_fit.worst
         return worst > _MERGED or (worst > ROUGH and self.meetings.side_by_side and self.single.of_sides is not None)
 
     def _is_closer(self):
         """Whether both sides of the single layer are closer to the surface than the extracted double cover, and do not
         miss ends of it that this shows. They may take long to find, so the single layer itself is asked first."""
-        if self.single.misfit[1] - self.extracted_fit[1] > SHOWN:
+        if self.single.misfit.missed - self.extracted_fit.missed > SHOWN:
             return False
         cover = self._off(self.extracted)
         return self._off(self.single.sheet[0]) < cover and self._off(self.both_sides) < cover
@@ -126,7 +126,7 @@ class Choice:
         return double_cover(self.values, self.band, self.local, self.grid, self.offset, part)
 
     @cached_property
-    def extracted_fit(self) -> tuple[float, float]:
+    def extracted_fit(self) -> Misfit:
         """:func:`misfit` of that."""
         return misfit(self.extracted, self.local, self.grid.spacing)
 

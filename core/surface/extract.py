@@ -104,7 +104,7 @@ def _offset(settings):
 
 def _double_cover(choice):
     """The double cover, and what is said of it."""
-    missed = choice.cover_fit[1]
+    missed = choice.cover_fit.missed
     return choice.cover, [_said_of_missed(missed, "double cover", "they are merged")] if missed > _SOME else []
 
 
@@ -116,7 +116,7 @@ def _single_layer(choice, beside_cover):
         return choice.cover, [_said_of_torn(choice.local, choice.grid)]
     said = []
     if missed > _SOME:
-        other = "" if beside_cover and choice.cover_fit[1] > _SOME else ", or use the double cover"
+        other = "" if beside_cover and choice.cover_fit.missed > _SOME else ", or use the double cover"
         said.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
     elif worst > 1 and (sheet.edges.count == 1).any():
         said.append(_SAID_OF_RAGS)
@@ -136,7 +136,7 @@ def _signed_surface(choice, values, progress):
     worst, missed = misfit(mesh, local, grid.spacing)
     if missed > _SOME:
         said.append(_said_of_missed(missed, "signed surface", "one of them is missing"))
-    elif worst > 1 and choice.extracted_fit[0] < BETTER * worst:
+    elif worst > 1 and choice.extracted_fit.worst < BETTER * worst:
         said.append("the signed surface is torn, as where walls run closer than the grid's cells; raise the resolution")
     if not sides.complete:
         said.append(

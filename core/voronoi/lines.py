@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 from ..neighbourhoods.lines import OTHERS, find_lines
 from ..points import SPACING_NEIGHBOURS
 from ..progress import Progress
+from ..trees import nearest_others
 from .facets import REACH
 
 _BEYOND = 1.3  # times its distance, up to where facets reach
@@ -20,12 +21,10 @@ def spacing_across_lines(points: np.ndarray, spacing: np.ndarray, progress=None)
 
     On a wavy sheet of parallel lines five local spacings apart, mean |n.n_true| was .25, now 1.0.
     """
-    n = len(points)
-    if n <= OTHERS:
+    if len(points) <= OTHERS:
         return spacing
-    tree, nearest = KDTree(points), np.empty((n, SPACING_NEIGHBOURS), np.int64)
-    for part in Progress.of(progress).chunks(n, _CHUNK):
-        nearest[part] = tree.query(points[part], k=SPACING_NEIGHBOURS + 1, workers=-1)[1][:, 1:]
+    tree = KDTree(points)
+    nearest = nearest_others(tree, SPACING_NEIGHBOURS, Progress.of(progress))[1]
     lines, found = find_lines(points, spacing, nearest), spacing.copy()
     own = np.flatnonzero(lines.number >= 0)
     for first in range(0, len(own), _CHUNK):

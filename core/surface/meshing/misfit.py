@@ -1,5 +1,7 @@
 """How far a mesh is from the samples and from the surface, and how much of it is turned away from them."""
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial import KDTree
 
@@ -21,11 +23,20 @@ _NO_AREA = 1e-9  # of the square of a mesh's size, twice the area of one that ha
 _TURNED = np.cos(np.pi / 4)
 
 
-def misfit(mesh: Mesh, surface: LocalSurface, cell: float) -> tuple[float, float]:
-    """How far the samples of the surface are off a mesh, or how much of it is turned away from them, whichever is
-    worse: 1 and more where the mesh is torn; and the share of the samples that it misses, by half a cell and more."""
+class Misfit(NamedTuple):
+    """worst  : how far samples are off a mesh, or how much of it is turned away from them, whichever is worse: 1 and
+             more where the mesh is torn
+    missed : share of the samples that it misses, by half a cell and more"""
+
+    worst: float
+    missed: float
+
+
+def misfit(mesh: Mesh, surface: LocalSurface, cell: float) -> Misfit:
+    """How badly a mesh fits the samples of a surface."""
     off = distances(mesh, surface.points) / cell
-    return max(off.mean() / _TORN, askew(mesh, surface.tree, surface.normals) / _ASKEW), (off > OFF).mean()
+    worst = max(off.mean() / _TORN, askew(mesh, surface.tree, surface.normals) / _ASKEW)
+    return Misfit(worst, (off > OFF).mean())
 
 
 def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray | None = None) -> float:

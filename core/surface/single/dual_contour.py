@@ -36,11 +36,20 @@ def dual_contour(crossings: Crossings, surface: LocalSurface, grid: Grid, progre
     vertices = sums_of_each(corner, place, len(near)) / np.bincount(corner, minlength=len(near))[:, None]
     step = to_planes(vertices, corner, place, np.repeat(crossings.normal, 4, axis=0), _STIFFNESS)[near]
     vertices[near] += shortened(step, grid.spacing)
+    quads = _once_each(quads, near)
     vertices, free = evened(vertices, quads, near), ~meeting
     step = surface.project(vertices[free], progress.part(0.0, 0.7)).step
     vertices[free] = settled(vertices[free], step, surface, grid.spacing, progress.part(0.7, 1.0))
     mesh = _without_touches(_without_repeats(mesh_of(vertices, quads)), grid.spacing)
     return pieces_with_samples(mesh, surface.tree, grid.spacing)
+
+
+def _once_each(quads, near):
+    """The quads (q,4) but for those with the vertices of another, all `near` a meeting of sheets, (v,) bool: of an edge
+    that two sheets cross which share them all, as they do where one ends on the other at a small angle."""
+    row = np.flatnonzero(near[quads].all(axis=1))
+    _, first = np.unique(quads[row], axis=0, return_index=True)
+    return np.delete(quads, np.delete(row, first), axis=0)
 
 
 def _without_touches(mesh, cell):

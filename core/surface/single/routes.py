@@ -106,7 +106,7 @@ def boundary_of_inside(
     signed : (nx,ny,nz) float32 or Blocks, distances, negative inside     cover : function that gives the double cover
     """
     mesh = signed_mesh(signed, sides.wedges, meetings.passing, surface, grid, progress)
-    if not meetings.much_side_by_side or misfit(mesh, surface, grid.spacing)[0] <= ROUGH:
+    if not meetings.much_side_by_side or misfit(mesh, surface, grid.spacing).worst <= ROUGH:
         return mesh
     outer = untangled(mended(one_side(cover(), signed, surface, grid), surface, grid.spacing), surface)
     closed = (outer.edge_counts()[1] == 2).all()
@@ -172,9 +172,9 @@ def sheet_of_crossings(
 def _of_torn(sheets, surface, grid):
     """The first of some sheets, each with the number of its edges that are not wound alike, unless another that there
     is fits the samples far better: one side of a double cover shows one wall of thin parts, but is nowhere ragged."""
-    best, least = sheets[0], misfit(sheets[0][0], surface, grid.spacing)[0]
+    best, least = sheets[0], misfit(sheets[0][0], surface, grid.spacing).worst
     for sheet in sheets[1:]:
-        if sheet[0] is not None and (worst := misfit(sheet[0], surface, grid.spacing)[0]) < BETTER * least:
+        if sheet[0] is not None and (worst := misfit(sheet[0], surface, grid.spacing).worst) < BETTER * least:
             best, least = sheet, worst
     return best
 

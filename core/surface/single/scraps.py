@@ -1,7 +1,7 @@
 """Scraps along the lines where sheets meet: a few faces between edges of three faces or more that show nothing.
 
 A spur is a small patch that ends in a border right past the line. A pocket is closed by patches that are all small:
-two quads with one rim, for instance.
+two of them with one rim, for instance.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ from ..edges.close_walls import beside_within_cells
 from ..edges.crossings import Crossings, find_crossings
 from ..edges.meetings import FEW, Meetings, find_meetings
 from ..mesh import Mesh
-from ..meshing.misfit import BETTER, ROUGH, SHOWN, misfit
+from ..meshing.misfit import BETTER, ROUGH, SHOWN, Misfit, misfit
 from ..signs.sides import Sides, find_sides
 from ..signs.two_sides import two_sided
 from .routes import sheet_between_sides, sheet_of_crossings, sheet_of_sides
@@ -124,7 +124,7 @@ class SingleLayer:
         return sheet_of_crossings(lambda: self.two_sides, *given, self.cover, part)
 
     @cached_property
-    def misfit(self) -> tuple[float, float]:
+    def misfit(self) -> Misfit:
         """:func:`misfit` of that."""
         return misfit(self.sheet[0], self.local, self.grid.spacing)
 
@@ -133,7 +133,7 @@ class SingleLayer:
         """Whether sheets run side by side, and it goes to and fro between them, or is torn where it bounds an inside
         and few of its meetings are of such sheets."""
         parted = self.sides.complete and not self.meetings.much_side_by_side
-        return self.meetings.side_by_side and self.misfit[0] > (1 if parted else ROUGH)
+        return self.meetings.side_by_side and self.misfit.worst > (1 if parted else ROUGH)
 
     def told_apart(self) -> "SingleLayer":
         """This, or where it is rough the one with sheets told apart by their room, if that is better:

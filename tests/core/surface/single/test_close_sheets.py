@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from core import Settings, reconstruct
-from core.surface.meshing.misfit import distances
+from core.surface.meshing.misfit import Misfit, distances
 from core.surface.single import single_layer
 from core.surface.single.single_layer import SingleLayer
 from tests import shapes
@@ -62,7 +62,9 @@ def test_what_room_tells_apart_is_taken_if_far_less_rough_or_if_it_shows_more(ro
         seen.append((found, told(found)))
         return seen[-1][1]
 
-    monkeypatch.setattr(SingleLayer, "misfit", property(lambda found: other if found.by_room else (rough, 0.03)))
+    monkeypatch.setattr(
+        SingleLayer, "misfit", property(lambda found: Misfit(*(other if found.by_room else (rough, 0.03))))
+    )
     monkeypatch.setattr(SingleLayer, "told_apart", look)
     single(glued_roll())
     [(plain, chosen)] = seen

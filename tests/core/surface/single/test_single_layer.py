@@ -166,6 +166,16 @@ def test_sheets_that_meet_at_random_samples_are_one_surface_without_pockets(name
     assert len(shapes.components(sheet)) == 1
 
 
+def test_a_sheet_that_rises_off_another_leaves_few_pockets_along_it():
+    """Tangentially: both cross many edges of the grid twice, whose two quads enclosed 12 pockets."""
+    random = np.random.default_rng(0)
+    floor, risen = random.uniform(-1, 1, (1500, 3)), random.uniform([0, -1, 0], 1, (750, 3))
+    floor[:, 2], risen[:, 2] = 0, 0.05 * risen[:, 0] ** 2
+    sheet = single(np.concatenate([floor, risen]), resolution=48, denoise=0).sheet
+    assert (sheet.edge_counts()[1] > 2).any()
+    assert shapes.euler(sheet) <= 3
+
+
 def fan(angles, both, seed):
     """Half squares that end at the y axis at some angles, or squares that pass through it, turned."""
     flat = shapes.square(1000)
