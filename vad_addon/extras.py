@@ -81,6 +81,14 @@ class VAD_OT_shell(_OfResult, bpy.types.Operator):
     def make(self, collection):
         return shapes.shell(collection, self.offset)
 
+    def execute(self, context):
+        done = super().execute(context)
+        if done == {"FINISHED"}:
+            shell = context.view_layer.objects.active
+            if not len(shell.evaluated_get(context.evaluated_depsgraph_get()).data.polygons):
+                self.report({"WARNING"}, f"{shell.name} is empty: no distance in the volume is {self.offset:.3g} cells")
+        return done
+
 
 class VAD_OT_slice(_OfResult, bpy.types.Operator):
     """Add a plane that shows the distances where it lies, with iso-lines. Move and turn it to look around"""

@@ -107,6 +107,21 @@ def test_a_shell_lies_at_its_distance_on_both_sides(blender, result):
         assert len(mesh.polygons) > 100
 
 
+@pytest.mark.parametrize("hidden", [None, "collection", "eye"])
+@pytest.mark.parametrize(("offset", "warned"), [(3, False), (40, True)])
+def test_a_shell_farther_off_than_any_distance_in_the_volume_is_said_to_be_empty(
+    blender, result, offset, warned, hidden, capfd
+):
+    collection = blender.context.scene.vad.result
+    if hidden == "collection":
+        collection.hide_viewport = True
+    elif hidden:
+        blender.context.view_layer.layer_collection.children[collection.name].hide_viewport = True
+    assert blender.ops.vad.shell(offset=offset) == {"FINISHED"}
+    told = "Warning: Scan field shell is empty: no distance in the volume is 40 cells" in capfd.readouterr().out
+    assert told == warned
+
+
 def test_shells_and_slices_follow_from_unsigned_distances_to_signed_ones_and_back(blender, scan, result):
     blender.ops.vad.shell(offset=3)
     shell = blender.context.active_object
