@@ -131,8 +131,8 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
     instances, after modifiers and geometry nodes. With `selected_only`, of objects in edit mode only what is selected
     there. Raises :class:`InputError` where there are none, and for objects that are disabled in viewports.
     """
-    clouds = [_world_cloud(obj, context, selected_only) for obj in objects]
-    points = np.concatenate([cloud[0] for cloud in clouds])
+    parts = [part for obj in objects for part in _in_world_space(obj, context, selected_only)]
+    points = np.concatenate([np.empty((0, 3)), *(points for points, _ in parts)])
     name = objects[0].name if len(objects) == 1 else f"{objects[0].name} and {len(objects) - 1} more"
     if not len(points):
         if selected_only and in_edit_mode(objects[0]):
@@ -143,11 +143,11 @@ def gather(objects: list[bpy.types.Object], context: bpy.types.Context, selected
             f"{name} has {len(points)} points, the origins of instances: add Realize Instances at the end of its "
             "geometry nodes"
         )
-    joined = attributes.join([(len(points), carried) for points, carried in clouds])
+    joined = attributes.join([(len(points), carried) for points, carried in parts])
     axes = joined.pop(AXIS).values if AXIS in joined else np.zeros((len(points), 3))
     fixed = np.flatnonzero(axes.any(axis=1))
     uids, constraints = tuple(obj.session_uid for obj in objects), (fixed, axes[fixed]) if len(fixed) else None
-    found = {name for _, carried in clouds for name in carried} - {AXIS}
+    found = {name for _, carried in parts for name in carried} - {AXIS}
     return Source(objects[0].name, uids, points, joined, constraints, tuple(_left_out(objects, found, joined, context)))
 
 
@@ -163,7 +163,7 @@ def _left_out(objects, found, carried, context):
     names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
     names += [*found, *(group.name for obj in objects for group in obj.vertex_groups)]
     if lost := sorted(set(names) - set(carried)):
-        kinds = "only numbers and colors of points are, of one type in all objects, no vertex groups"
+        kinds = "only numbers and colors of points are, of one type wherever they are, no vertex groups"
         yield f"Not carried over: {', '.join(lost)}; {kinds}"
 
 
@@ -202,20 +202,18 @@ def _point_count(obj, context):
     return mesh + sum(cloud.attributes.domain_size("POINT") for cloud in clouds if cloud)
 
 
-def _world_cloud(obj, context, selected_only):
-    """(n,3) float64 points in world space and what they carry."""
+def _in_world_space(obj, context, selected_only):
+    """(n,3) float64 points of each component of the object in world space, and what they carry."""
     if in_edit_mode(obj):
         obj.update_from_editmode()
     geometry, evaluated = _geometry(obj, context), obj.evaluated_get(context.evaluated_depsgraph_get())
     if geometry is None:
         raise InputError(_is_off(obj))
-    parts = list(_components(evaluated, geometry, selected_only and in_edit_mode(obj)))
-    local = np.concatenate([np.empty((0, 3)), *(points for points, _ in parts)])
-    carried = attributes.join([(len(points), found) for points, found in parts])
-    if AXIS in carried:
-        turn = np.array(evaluated.matrix_world, np.float64)[:3, :3]
-        carried[AXIS] = Attribute("FLOAT_VECTOR", carried[AXIS].values @ np.linalg.pinv(turn))
-    return in_world(local, evaluated), carried
+    turn = np.array(evaluated.matrix_world, np.float64)[:3, :3]
+    for points, carried in _components(evaluated, geometry, selected_only and in_edit_mode(obj)):
+        if AXIS in carried:
+            carried[AXIS] = Attribute("FLOAT_VECTOR", carried[AXIS].values @ np.linalg.pinv(turn))
+        yield in_world(points, evaluated), carried
 
 
 def in_world(points: np.ndarray, obj: bpy.types.Object) -> np.ndarray:

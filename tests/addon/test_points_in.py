@@ -392,6 +392,27 @@ def test_joined_colours_and_numbers_of_other_types_line_up(gather, add_mesh, sph
     assert any(line.startswith("Not carried over: mixed;") for line in found.warnings)
 
 
+def test_what_the_components_of_one_object_hold_with_other_types_is_told(blender, gather, add_mesh, sphere):
+    """A mesh that geometry nodes put points of a cloud beside, which carry a vector of the same name."""
+    scan = add_mesh("Scan", sphere)
+    scan.data.attributes.new("mixed", "FLOAT", "POINT")
+    nodes = blender.data.node_groups.new("Beside", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        nodes.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    kinds = "NodeGroupInput", "GeometryNodePoints", "GeometryNodeStoreNamedAttribute", "GeometryNodeJoinGeometry"
+    start, points, store, both, end = (nodes.nodes.new(kind) for kind in (*kinds, "NodeGroupOutput"))
+    points.inputs["Count"].default_value = 3
+    store.data_type = "FLOAT_VECTOR"
+    store.inputs["Name"].default_value = "mixed"
+    for one, other in ((start, both), (points, store), (store, both), (both, end)):
+        nodes.links.new(one.outputs[0], other.inputs[0])
+    scan.modifiers.new("Beside", "NODES").node_group = nodes
+    found = gather()
+    assert len(found.points) == len(sphere) + 3
+    assert "mixed" not in found.attributes
+    assert found.warnings[0].startswith("Not carried over: mixed;")
+
+
 def test_colours_of_corners_without_faces_are_told(blender, gather, add_mesh, sphere):
     scan = add_mesh("Scan", sphere)
     scan.data.attributes.new("Col", "BYTE_COLOR", "CORNER")
