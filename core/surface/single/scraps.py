@@ -1,7 +1,7 @@
 """Scraps along the lines where sheets meet: a few faces between edges of three faces or more that show nothing.
 
-A spur is a small patch that ends in a border right past the line. A pocket is closed by patches that are all small:
-two of them with one rim, for instance.
+A spur is a small patch that ends in a border right past the line, or hangs on a vertex there. A pocket is closed by
+patches that are all small: two of them with one rim, for instance.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from ...parts import connected_parts, extents
 from ..mesh import Mesh
 
 _SMALL = 32  # faces of a patch
-_PAST = 1.5  # cells, that a spur goes past the line
+_PAST = 1.75  # cells, that a spur goes past the line
 _SIZE = 0.1  # of a patch's own extent, counted beside its distance from the surface
 _ROUNDS = 4
 
@@ -74,8 +74,9 @@ def _scraps(mesh, face, label, edge, counts, surface, cell):
         left[number] -= times
         dropped[part] = True
 
+    shared = np.bincount(mesh.faces.reshape(-1), minlength=len(mesh.vertices))
     for patch in np.flatnonzero(open_patch):
-        if _is_spur(mesh, face[parts[patch]], edge, counts, cell):
+        if _is_spur(mesh, face[parts[patch]], edge, counts, shared, cell):
             drop(parts[patch])
     rims = _Independent()
     for patch in np.argsort(cost, kind="stable"):
@@ -105,14 +106,18 @@ class _Independent:
         return bool(row)
 
 
-def _is_spur(mesh, face, edge, counts, cell):
-    """Whether all vertices of a patch with a border lie within 1.5 cells of a line that it ends at."""
+def _is_spur(mesh, face, edge, counts, faces_at, cell):
+    """Whether all vertices of a patch with a border lie within 1.75 cells of a line that it ends at, or of the vertices
+    that it has in common with others where it ends at none; `faces_at` (v,) are all faces of each vertex."""
     tail, head = mesh.faces[face], np.roll(mesh.faces[face], -1, axis=1)
     line = counts[edge[face]] > 2
-    if not line.any():
-        return False
+    own, times = np.unique(tail, return_counts=True)
     start, stop = mesh.vertices[tail[line]], mesh.vertices[head[line]]
-    x = mesh.vertices[np.unique(tail)]
+    if not line.any():
+        start = stop = mesh.vertices[own[times < faces_at[own]]]
+    if not len(start):
+        return False
+    x = mesh.vertices[own]
     along = stop - start
     share = row_dots(x[:, None] - start, along) / np.maximum((along**2).sum(axis=1), 1e-300)
     foot = start + np.clip(share, 0, 1)[..., None] * along

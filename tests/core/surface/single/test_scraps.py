@@ -61,6 +61,15 @@ def test_a_spur_below_the_floor_goes(surface):
     assert same(without_scraps(spur, surface, CELL), mesh)
 
 
+@pytest.mark.parametrize("stays", [False, True])
+def test_a_face_that_hangs_on_a_vertex_goes_and_one_by_itself_stays(surface, stays):
+    mesh, line = sheets()
+    n = len(mesh.vertices)
+    points = [[0, 0, -1], [0, 1, -1], [0, 0.5, -0.1]]
+    more = with_more(mesh, points, [[n + 2 if stays else line[4], n, n + 1]])
+    assert same(without_scraps(more, surface, CELL), more if stays else mesh)
+
+
 def test_a_flap_of_several_cells_stays(surface):
     mesh, line = sheets()
     n = len(mesh.vertices)
