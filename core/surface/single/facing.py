@@ -44,5 +44,6 @@ def _is_in_front(middle, area, towards, side):
     """Whether little of the faces is behind others, as seen from a `side`, (3,), by the pixels that they fill."""
     across = np.linalg.svd(side[None])[2][1:]
     pixel = _PIXEL * np.sqrt(np.median(area))
-    filled = np.unique(np.floor(across @ middle / pixel), axis=1).shape[1]
+    column, row = np.floor(across @ middle / pixel)
+    filled = len(np.unique((row - row.min()) * (np.ptp(column) + 1) + column - column.min()))
     return filled * pixel**2 >= _IN_FRONT * np.abs(towards).sum()
