@@ -4,12 +4,12 @@ and what it finds does not depend on where it looks up."""
 import numpy as np
 import pytest
 
-from core import points as core_points
+from core import trees
 from core.cleaning import outliers, surroundings
 from core.cleaning.positions import denoise
 from core.field import curvature, local_surface
 from core.field.rims import borders
-from core.neighbourhoods import cloud, quadrics
+from core.neighbourhoods import quadrics
 from core.points import local_spacing
 from tests import shapes
 
@@ -41,10 +41,10 @@ def looks_and_results(stage):
 @pytest.mark.parametrize(
     ("stage", "module", "name", "size"),
     [
-        ("spacing", core_points, "_CHUNK", CHUNK),
+        ("spacing", trees, "_CHUNK", CHUNK),
         ("outliers", surroundings, "_CHUNK", CHUNK),
         ("denoising", quadrics, "_QUERIED", 12 * CHUNK),
-        ("patches", cloud, "_CHUNK", CHUNK),
+        ("patches", trees, "_CHUNK", CHUNK),
         ("patches", curvature, "_CHUNK", CHUNK),
         ("patches", borders, "_CHUNK", CHUNK),
     ],
