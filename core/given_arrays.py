@@ -4,6 +4,8 @@ import numpy as np
 
 from .errors import InputError
 
+_SMALLEST, _LARGEST = 1e-60, 1e60  # span of points, of which higher powers in double precision are told from 0 and inf
+
 
 def real_numbers(given, what: str, wanted: str) -> np.ndarray:
     """An array-like as float64, NaN where it is masked. Raises :class:`InputError`, with `what` it is and what is
@@ -33,6 +35,15 @@ def finite_points(given, least: int = 0) -> np.ndarray:
         raise InputError(f"{(~finite).sum()} of {len(points)} points are not finite; leave them out")
     if len(points) < least:
         raise InputError(f"{len(points)} points given; at least {least} are needed")
+    return points
+
+
+def workable_points(given, least: int = 0) -> np.ndarray:
+    """The same of points that are all in one place, or span so much that powers of distances can be worked with; raises
+    :class:`InputError` otherwise."""
+    points = finite_points(given, least)
+    if len(points) and np.ptp(points / 2, axis=0).any():
+        span_of(points, "powers of distances", _SMALLEST, _LARGEST)
     return points
 
 

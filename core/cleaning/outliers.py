@@ -7,7 +7,7 @@ stand off the plane of its neighbours, or lie among samples that form no surface
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..given_arrays import finite_points, span_of
+from ..given_arrays import workable_points
 from ..linalg import unit
 from ..progress import Progress
 from ..trees import k_nearest
@@ -17,7 +17,6 @@ from .off_wires import off_wires
 from .standing_out import hovering, proud
 from .surroundings import FEWEST, NEIGHBOURS, SHEET, Surroundings, thickness
 
-_WIDEST = 1e100  # span of the points, of which higher powers are to be finite, too
 _ROUNDS = 6  # strays hide strays
 _LONELY = 2.0  # spacing over that of the neighbours
 _ALONE = 5.0  # so lonely that the plane no longer matters
@@ -92,11 +91,10 @@ def find_outliers(points, progress=None) -> np.ndarray:
 def remove_outliers(points, progress=None) -> tuple[np.ndarray, np.ndarray]:
     """The samples (n',3) of (n,3) that are no strays, and their rows (n',) int64, see :func:`find_outliers`.
 
-    Raises :class:`InputError` for points that are not finite, or so far apart that powers of distances are not.
+    Raises :class:`InputError` for points that are not finite, or that powers of distances between cannot be
+    worked with.
     """
-    points = finite_points(points)
-    if len(points):
-        span_of(points, "powers of distances", 0.0, _WIDEST)
+    points = workable_points(points)
     kept = np.flatnonzero(~find_outliers(points, progress))
     return points[kept], kept
 

@@ -8,7 +8,7 @@ them; by these, edges stay (see :mod:`.meeting_sheets`).
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..given_arrays import finite_points, spacing_of
+from ..given_arrays import spacing_of, workable_points
 from ..linalg import shortened
 from ..neighbourhoods.clusters import Clusters
 from ..neighbourhoods.quadrics import fit_quadrics
@@ -34,10 +34,10 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     strength : "auto" moves the samples that are found noisy; a number in [0,1] moves all this share of the way (0 none)
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
-    nothing is to do. Raises :class:`InputError` for points that are not finite and for spacings that are none,
-    :class:`SettingsError` for another strength or seed.
+    nothing is to do. Raises :class:`InputError` for points that are not finite, or that powers of distances between
+    cannot be worked with, and for spacings that are none, :class:`SettingsError` for another strength or seed.
     """
-    progress, given, points = Progress.of(progress), points, finite_points(points)
+    progress, given, points = Progress.of(progress), points, workable_points(points)
     spacing = spacing_of(points, spacing)
     strength = Settings(denoise=strength, seed=seed).denoise
     if len(points) <= LADDER[0] or strength == 0:

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..errors import InputError
 from ..given_arrays import finite_points, spacing_of, span_of
 from ..linalg import COMPONENTS
 from ..neighbourhoods.close_sheets import sheet_room
@@ -89,11 +90,11 @@ class LocalSurface:
 
 
 def fit_local_surface(points, normals, confidence, spacing, bridge: float, progress=None) -> LocalSurface:
-    """Patches and rims of distinct samples (n,3) with axes (n,3) of any length, their confidence (n,) in [0,1] and
+    """Patches and rims of samples (n,3) with axes (n,3) of any length, their confidence (n,) in [0,1] and
     local spacing (n,), units of the samples; gaps up to `bridge` spacings are closed. Some may be added beside creases,
     after those given, see :mod:`.rims.line_creases`. Raises :class:`InputError` for other shapes, what is not finite,
-    axes without a direction, spacings not above 0, and points that span more or less than single precision holds the
-    fourth powers of, :class:`SettingsError` for a bridge outside its limits."""
+    points that occur twice, axes without a direction, spacings not above 0, and points that span more or less than
+    single precision holds the fourth powers of, :class:`SettingsError` for a bridge outside its limits."""
     bridge = Settings(bridge=bridge).bridge
     progress, points = Progress.of(progress), finite_points(points, least=2)
     span_of(points, "powers of distances in single precision", _SMALLEST, _LARGEST)
@@ -112,6 +113,8 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
 def _fitted(points, normals, confidence, spacing, source, bridge, added, progress):
     """The local surface of samples, the last of which may be `added`, and the samples with those around each."""
     cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))
+    if added is None and not cloud.distinct:
+        raise InputError("some points occur twice; give each of them once, as prepare_samples does")
     room = sheet_room(cloud, progress.part(0.1, 0.2))
     bend = bending(cloud, room, progress.part(0.2, 0.5))
     rims = find_rims(cloud, bend, bridge, progress.part(0.5, 0.84))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import InputError, SettingsError
-from ..given_arrays import finite_points, real_numbers, spacing_of
+from ..given_arrays import real_numbers, spacing_of, workable_points
 from ..linalg import row_dots
 from ..points import MINIMUM_SAMPLES
 from ..progress import Progress
@@ -36,12 +36,13 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     from which Adam ends in poorer minima: three shapes reached a mean |n.n_true| of .934, .962 and .975 instead of
     .970, .989 and .9999.
 
-    Raises :class:`InputError` for fewer than 4 points, points that are not finite or occur twice (but the plain plane
-    fit takes such), spacings that are none, and constraints as :func:`checked_constraints` does,
+    Raises :class:`InputError` for fewer than 4 points, points that are not finite, that powers of distances between
+    cannot be worked with, or that occur twice (but the plain plane fit takes such), spacings that are none, and
+    constraints as :func:`checked_constraints` does,
     :class:`MissingDependency` where torch or a GPU is asked for and missing, :class:`SettingsError` where NumPy is to
     use a GPU.
     """
-    progress, points = Progress.of(progress), finite_points(points, least=MINIMUM_SAMPLES)
+    progress, points = Progress.of(progress), workable_points(points, least=MINIMUM_SAMPLES)
     spacing = spacing_of(points, spacing)
     constraints, _ = checked_constraints(constraints, np.arange(len(points)), len(points))
     if settings.solver == "pca":

@@ -25,6 +25,7 @@ from core import (
     fit_local_surface,
     local_spacing,
     reconstruct,
+    remove_outliers,
     single_layer,
 )
 from core.io.points import read_points
@@ -102,6 +103,14 @@ def test_stages_alone_refuse_what_a_run_refuses():
     for size in (1e-20, 1e20):
         with pytest.raises(InputError, match=r"the points span .* from 1e-07 to 1e\+10"):
             fit_local_surface(size * points, points, np.ones(300), size * spacing, 3.0)
+    for size in (1e-120, 1e-61, 1e61, 1e300):
+        for stage in (remove_outliers, lambda x: denoise(x, spacing), lambda x: estimate_normals(x, spacing)):
+            with pytest.raises(InputError, match=r"the points span .* from 1e-60 to 1e\+60"):
+                stage(size * points)
+    twice = np.vstack([points[:299], points[:1]])
+    for stage in (estimate_normals, lambda x, s: fit_local_surface(x, points, np.ones(300), s, 3.0)):
+        with pytest.raises(InputError, match="some points occur twice; give each of them once"):
+            stage(twice, spacing)
     for bridge in (0, -1, 100, float("nan"), float("inf"), "3"):
         with pytest.raises(SettingsError, match=f"bridge is {bridge!r}; it must be a number from 1.5 to 20.0"):
             fit_local_surface(points, points, np.ones(300), spacing, bridge)
@@ -130,6 +139,10 @@ def test_stages_alone_refuse_what_a_run_refuses():
             stage()
     with pytest.raises(InputError, match=r"distances have shape \(\) and the grid"):
         double_cover(None, near, surface, grid, 1)
+    sheet, _ = single_layer(values, near, crossings, sides, surface, grid)
+    for cell in (0, -1.0, float("nan"), float("inf"), None, points):
+        with pytest.raises(SettingsError, match=f"cell is {re.escape(repr(cell))}; it must be a length above 0"):
+            both_sides(sheet, cell)
 
 
 @pytest.mark.parametrize("solver", ["reflection", "pca", "energy"])

@@ -1,9 +1,11 @@
 """The double cover of a sheet: both its sides, joined at its borders and around the edges where sheets meet."""
 
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
+from ...errors import SettingsError
 from ...linalg import lengths
 from ..mesh import Mesh, at_corners, face_normals
 from ..mesh_edges import corner_after
@@ -22,7 +24,11 @@ def both_sides(sheet: Mesh, cell: float) -> Mesh:
     Where two pairs of them have the same vertices at both its ends, as where these are on a border, they are joined in
     two halves, and where parts of the sheet touch in a vertex each gets its own, so that every edge of the result has
     two faces and those around a vertex form one fan.
+
+    Raises :class:`SettingsError` for a cell that is not above 0 and finite.
     """
+    if not isinstance(cell, Real) or not 0 < cell < np.inf:
+        raise SettingsError(f"cell is {cell!r}; it must be a length above 0, as a grid's spacing is")
     if not len(sheet.faces):
         return sheet
     sheet = _turned(sheet)

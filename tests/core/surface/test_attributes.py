@@ -51,3 +51,5 @@ def test_a_row_for_each_point_of_the_input_is_needed(sphere_run):
     for label, shape in ((np.zeros(1499), r"\(1499,\)"), (5, r"\(\)")):
         with pytest.raises(InputError, match=f"'label' has shape {shape}; give one row for each of 1500 points"):
             vertex_attributes(sphere_run.surface, sphere_run, {"label": label})
+    with pytest.raises(InputError, match=r"'label' is no array \(.*\); give one row for each of 1500 points"):
+        vertex_attributes(sphere_run.surface, sphere_run, {"label": [[1, 2, 3], [4, 5]]})
