@@ -141,7 +141,9 @@ def _parsed(arguments):
     """What was given. Raises :class:`SettingsError` for what no option takes, with the option that may be meant."""
     given, unknown = _parser().parse_known_args(arguments)
     if unknown:
-        meant = get_close_matches(unknown[0].partition("=")[0], given.spelt, 1)
+        name = unknown[0].partition("=")[0]
+        begun = list({option.replace("_", "-") for option in given.spelt if option.startswith(name)})
+        meant = begun if len(begun) == 1 else get_close_matches(name, given.spelt, 1, 0.75)
         raise SettingsError(
             f"unrecognized: {' '.join(unknown)}{f' (is {meant[0]} meant?)' if meant else ''}; {given.command} takes "
             f"one scan at a time, and the options of {PROGRAM} {given.command} --help"

@@ -136,6 +136,16 @@ def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
     return nearest_others(KDTree(points), SPACING_NEIGHBOURS, Progress.of(progress))[0].mean(axis=1)
 
 
+def refuse_copies(points: np.ndarray) -> None:
+    """Raises :class:`InputError` where points (n,3) occur twice."""
+    n = len(points)
+    if len(np.unique(points[:, 0])) < n and (distinct := len(first_of_each(points, np.arange(n)))) < n:
+        raise InputError(
+            f"some points occur twice: {distinct} of {n} are distinct; give each of them once, as "
+            "numpy.unique(points, axis=0) does"
+        )
+
+
 def rounding_warning(points: np.ndarray, spacing: float) -> tuple[str, ...]:
     """Says, in one line or none, that coordinates of points (n,3), float64, were rounded to the steps that single
     precision has so far from the origin, and that these are not small beside the `spacing` of the points. Whole numbers

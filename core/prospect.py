@@ -45,10 +45,11 @@ def look_ahead(points, settings: Settings = Settings(), progress=None) -> Prospe
 
 def _suited(samples, thinned, every, settings, progress):
     """The resolution that suits what the coarsest grid leaves of dense lines."""
-    coarsest = replace(settings, denoise=0.0, resolution=options()["resolution"].metadata["limits"][0])
+    limits = options()["resolution"].metadata["limits"]
+    coarsest = replace(settings, denoise=0.0, surface="none", resolution=limits[0])
     if settings.outliers and not thinned:
         cell = fit_grid(samples.points, coarsest.resolution).spacing
         thinned = not thinned_lines(samples.points, cell, progress.part(0.0, 0.3)).all()
     if thinned:
         samples = clean(every, coarsest, progress.part(0.3, 1.0))[0]
-    return suited_resolution(samples.points, samples.local_spacing())
+    return max(settings.coarsest, suited_resolution(samples.points, samples.local_spacing()))

@@ -173,7 +173,9 @@ class Settings:
         for option in dataclasses.fields(self):
             object.__setattr__(self, option.name, _checked(option, getattr(self, option.name)))
         if self.band is None and self.resolution > WHOLE_BOX:
-            banded = "set band, for instance to 4," + " and integration to transport," * (self.integration == "poisson")
+            banded = f"set band, for instance to {max(4, ceil(self.offset + BESIDE_OFFSET))},"
+            if self.integration == "poisson":
+                banded += " and integration to transport," + " diffusion to kernel," * (self.diffusion == "grid")
             raise SettingsError(
                 f"resolution is {self.resolution} and the whole box may have {WHOLE_BOX} cells at most; {banded} or "
                 "lower the resolution"

@@ -166,7 +166,9 @@ class VAD_OT_show(bpy.types.Operator):
         collection, there = chosen_result(context), context.scene.objects
         objects = [obj for obj in results.shown_as(collection, self.role) if results.is_among(obj, there)]
         if not objects:
-            self.report({"ERROR"}, f"{collection.name} has no {self.role}: it was deleted, or not asked for")
+            text = next(text for role, _, text in results.SHOWN if role == self.role)
+            why = "deleted" if self.role == "source" else "deleted, or not asked for"
+            self.report({"ERROR"}, f"{collection.name} has nothing to show for {text}: it was {why}")
             return {"CANCELLED"}
         shown = not all(obj.visible_get() for obj in objects)
         for obj in objects:
@@ -260,8 +262,9 @@ class VAD_OT_fix_axes(_OfEditedMesh, bpy.types.Operator):
             world = np.array(context.region_data.view_rotation @ Vector((0, 0, 1)))
         else:
             world = np.array(self.axis)
-        if not np.linalg.norm(world, axis=-1).all():
-            raise InputError("An axis of length 0 has no direction: give another one")
+        length = np.linalg.norm(world, axis=-1)
+        if not ((length > 0) & (length < np.inf)).all():
+            raise InputError(f"An axis of length {np.min(length):g} has no direction: give another one")
         matrix = np.array(obj.matrix_world, np.float64)
         return world @ matrix[:3, :3]  # normals go from world to object space by the transposed matrix
 

@@ -47,7 +47,7 @@ def _with_lines_thinned(samples, resolution, progress):
         return samples
     said = (
         f"{(~left).sum()} of {len(left)} points dropped from lines, where they lie much closer than the next line and "
-        "than a cell; with outliers=False they stay"
+        "than a cell; with outliers off they stay"
     )
     return samples.without(~left, said)
 
@@ -59,7 +59,7 @@ def _said_of_dropped(dropped, points):
     if every < _FAR * rest:
         return said
     larger = f"the grid's cells would be {every / rest:.2g} times as large with them"
-    return f"{said}, some so far from the rest that {larger}; with outliers=False they stay"
+    return f"{said}, some so far from the rest that {larger}; with outliers off they stay"
 
 
 def _boundary_of_solid(samples, seed):
@@ -72,7 +72,7 @@ def _boundary_of_solid(samples, seed):
 
 def _said_of_inside(inside, solid):
     return (
-        f"{inside.sum()} of {len(inside)} points lie inside {solid}: its boundary alone is taken; with outliers=False "
+        f"{inside.sum()} of {len(inside)} points lie inside {solid}: its boundary alone is taken; with outliers off "
         "they stay"
     )
 

@@ -12,6 +12,7 @@ from ..given_arrays import spacing_of, workable_points
 from ..linalg import shortened
 from ..neighbourhoods.clusters import Clusters
 from ..neighbourhoods.quadrics import fit_quadrics
+from ..points import refuse_copies
 from ..progress import Progress
 from ..settings import Settings
 from .meeting_sheets import onto_one_sheet
@@ -34,14 +35,16 @@ def denoise(points, spacing, strength: float | str = "auto", seed: int = 0, prog
     strength : "auto" moves the samples that are found noisy; a number in [0,1] moves all this share of the way (0 none)
 
     No sample moves further than LONGEST_MOVE times the noise estimated around it. Returns the very array given where
-    nothing is to do. Raises :class:`InputError` for points that are not finite, or that powers of distances between
-    cannot be worked with, and for spacings that are none, :class:`SettingsError` for another strength or seed.
+    nothing is to do. Raises :class:`InputError` for points that are not finite, that powers of distances between cannot
+    be worked with, or that occur twice, and for spacings that are none, :class:`SettingsError` for another strength or
+    seed.
     """
     progress, given, points = Progress.of(progress), points, workable_points(points)
     spacing = spacing_of(points, spacing)
     strength = Settings(denoise=strength, seed=seed).denoise
     if len(points) <= LADDER[0] or strength == 0:
         return given, {}
+    refuse_copies(points)
     voxels = find_voxels(points, seed)
     if strength == "auto":
         noisy, strength = noisy_samples(points, spacing, seed, progress.part(0.0, 0.1), voxels), 1.0

@@ -10,6 +10,7 @@ from ..given_arrays import finite_points
 
 CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T  # of a cell, as steps from its lowest node
 ADJACENT = 1.8  # cells, between the middles of edges of the grid that are next to each other
+_FINEST = 2**20  # cells along the longest side, so that numbers of nodes fit 64 bits
 PADDING = 0.125  # of the object's longest side, on every side
 
 
@@ -63,13 +64,13 @@ def node_strides(shape: tuple[int, int, int]) -> np.ndarray:
 def fit_grid(points: np.ndarray, resolution: int) -> Grid:
     """A grid of cubic cells on the points' bounding box, padded by PADDING on every side: `resolution` cells along the
     longest side, as many as needed along the others. Raises :class:`InputError` for anything but points (n,3), n >= 1,
-    that are finite and not all in one place, :class:`SettingsError` for what is no number of cells from 1 on."""
+    that are finite and not all in one place, :class:`SettingsError` for what is no number of cells from 1 to 2^20."""
     points = finite_points(points, least=1)
     low, high = points.min(axis=0), points.max(axis=0)
     if not 0 < (high - low).max() < np.inf:
         raise InputError(f"the points reach from {low} to {high}; a grid needs points that are not all in one place")
-    if not isinstance(resolution, Real) or not 1 <= resolution < np.inf:
-        raise SettingsError(f"resolution is {resolution!r}; a grid needs a number of cells, at least 1")
+    if not isinstance(resolution, Real) or not 1 <= resolution <= _FINEST:
+        raise SettingsError(f"resolution is {resolution!r}; a grid needs a number of cells from 1 to {_FINEST}")
     padding = PADDING * (high - low).max()
     sides = high - low + 2 * padding
     spacing = float(sides.max() / resolution)

@@ -6,12 +6,12 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..errors import InputError
 from ..given_arrays import finite_points, spacing_of, span_of
 from ..linalg import COMPONENTS
 from ..neighbourhoods.close_sheets import sheet_room
 from ..neighbourhoods.cloud import Cloud
 from ..normals.known import known_normals
+from ..points import refuse_copies
 from ..progress import Progress
 from ..settings import Settings
 from ..trees import k_nearest
@@ -98,6 +98,7 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
     bridge = Settings(bridge=bridge).bridge
     progress, points = Progress.of(progress), finite_points(points, least=2)
     span_of(points, "powers of distances in single precision", _SMALLEST, _LARGEST)
+    refuse_copies(points)
     normals, confidence = known_normals((normals, confidence), len(points), slice(None))
     spacing = spacing_of(points, spacing)
     given = points, normals, confidence, spacing, np.arange(len(points))
@@ -113,8 +114,6 @@ def fit_local_surface(points, normals, confidence, spacing, bridge: float, progr
 def _fitted(points, normals, confidence, spacing, source, bridge, added, progress):
     """The local surface of samples, the last of which may be `added`, and the samples with those around each."""
     cloud = Cloud.of(points, normals, spacing, progress.part(0.0, 0.1))
-    if added is None and not cloud.distinct:
-        raise InputError("some points occur twice; give each of them once, as prepare_samples does")
     room = sheet_room(cloud, progress.part(0.1, 0.2))
     bend = bending(cloud, room, progress.part(0.2, 0.5))
     rims = find_rims(cloud, bend, bridge, progress.part(0.5, 0.84))

@@ -44,8 +44,8 @@ def read_points(path: str | os.PathLike) -> np.ndarray:
     .xyz, .pts, .txt, .csv  : a point a line, split by blanks, commas or semicolons; decimals after a comma where
                               something else parts the numbers; comments after # or //. A first line may name the
                               columns, x, y and z among them (three of which none says something else may have other
-                              names), or number them from 0, or be the number of points that follow, after which
-                              there may be more such blocks
+                              names), or number them from 0 with more than blanks between, or be the number of
+                              points that follow, after which there may be more such blocks
     .npy, .npz              : an (n,3) array (of a .npz: the one called `points`, else the only one of that shape)
     .obj                    : the v lines
 

@@ -240,8 +240,9 @@ def _is_count(line):
 
 
 def _is_numbering(line):
-    """Whether a line counts columns from 0 on, between commas, as tables without names are written."""
-    cells = _cells(line, ",")
+    """Whether a line counts columns from 0 on, not between blanks, as tables without names are written."""
+    mark = _mark_in(line)
+    cells = [] if mark is None else _cells(line, mark)
     return len(cells) >= 3 and cells == list(map(str, range(len(cells))))
 
 

@@ -39,11 +39,6 @@ class Cloud:
         lines = find_lines(points, spacing, neighbours)
         return cls(points, normals, spacing, tangent_frames(normals), neighbours, tree, lines)
 
-    @property
-    def distinct(self) -> bool:
-        """Whether no two samples are in one place."""
-        return (self.points != self.points[self.neighbours[:, 0]]).any(axis=1).all()
-
     def turned(self, normals: np.ndarray) -> "Cloud":
         """The same with other normals (n,3)."""
         return replace(self, normals=normals, frames=tangent_frames(normals))

@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import InputError, SettingsError
 from ..given_arrays import real_numbers, spacing_of, workable_points
 from ..linalg import row_dots
-from ..points import MINIMUM_SAMPLES
+from ..points import MINIMUM_SAMPLES, refuse_copies
 from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples
@@ -50,6 +50,7 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
         if constraints is not None:
             normals[constraints[0]] = constraints[1]
         return normals, confidence, {}
+    refuse_copies(points)
     if settings.solver == "energy":
         return _least_energy(points, spacing, settings, constraints, progress)
     heeded = spacing_across_lines(points, spacing, progress.part(0.0, 0.02))
@@ -119,7 +120,11 @@ def checked_constraints(constraints, source_index: np.ndarray, count: int):
     axes = real_numbers(axes, "constraint axes", "a (k,3) array")
     if not indices.size and not axes.size:
         return None, ()
-    if indices.ndim != 1 or axes.shape != (len(indices), 3) or (len(indices) and indices.dtype.kind not in "iu"):
+    if indices.size and indices.dtype.kind not in "iu":
+        raise InputError(
+            f"constraint indices are {indices.dtype}; give whole numbers, of a mask what numpy.flatnonzero(mask) does"
+        )
+    if indices.ndim != 1 or axes.shape != (len(indices), 3):
         raise InputError(
             f"constraints have shapes {indices.shape} and {axes.shape}; give whole-number indices (k,) and axes (k,3)"
         )

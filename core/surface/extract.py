@@ -14,15 +14,16 @@ from .choice import SPARSEST, Choice
 from .double.double_cover import CLAMP, SPARSE, level_for
 from .mesh import Mesh
 from .meshing.isosurface import need_quads
-from .meshing.misfit import BETTER, OFF, misfit
+from .meshing.misfit import BETTER, OFF, left_out, misfit
 from .meshing.pieces import without_small_pieces
-from .signed import signed_distance
+from .signed import signed_distance, spelt_out
 from .signs.sides import needed_band
 from .single.routes import boundary_of_inside
 
 _MESHES = {"none": (), "both": ("double", "single")}  # of these settings; of the others the one of that name
 _WITH_SIDES = "single", "both", "signed"  # kinds of surface for which the two sides are told apart
 _SOME = 0.02  # share of the samples that a mesh misses, above which it is said
+_LACKING = 5  # samples off a sheet, from which on it lacks what they show; of whole ones it is one of some 5,000
 _SAID_OF_RAGS = (
     "the single layer is torn in places, as where thin parts have few points or cells across; give more points, raise "
     "the resolution, or use the double cover"
@@ -84,8 +85,8 @@ def extract_surfaces(
         values = signed_distance(values, choice.single.sides, local, place)
     ways = {
         "double": lambda: _double_cover(choice),
-        "single": lambda: _single_layer(choice, beside_cover=kind == "both"),
-        "signed": lambda: _signed_surface(choice, values, progress.part(0.6, 1.0, "signed surface")),
+        "single": lambda: _single_layer(choice, place, beside_cover=kind == "both"),
+        "signed": lambda: _signed_surface(choice, place, values, progress.part(0.6, 1.0, "signed surface")),
     }
     meshes, dropped, warnings = {}, {}, []
     for name in _MESHES.get(kind, (kind,)):
@@ -108,7 +109,7 @@ def _double_cover(choice):
     return choice.cover, [_said_of_missed(missed, "double cover", "they are merged")] if missed > _SOME else []
 
 
-def _single_layer(choice, beside_cover):
+def _single_layer(choice, place, beside_cover):
     """The single layer, or the double cover where that is torn, and what is said of it; `beside_cover` where there is a
     double cover as well."""
     sheet, unoriented, (worst, missed) = choice.best_single
@@ -120,6 +121,8 @@ def _single_layer(choice, beside_cover):
         said.append(_said_of_missed(missed, "single layer", "one of them is missing") + other)
     elif worst > 1 and (sheet.edges.count == 1).any():
         said.append(_SAID_OF_RAGS)
+    else:
+        said += _said_of_left_out(choice, sheet, "single layer", place)
     if unoriented:
         said.append(
             f"the single layer cannot be wound alike across {unoriented} of its edges: the surface is one-sided "
@@ -128,7 +131,7 @@ def _single_layer(choice, beside_cover):
     return sheet, said
 
 
-def _signed_surface(choice, values, progress):
+def _signed_surface(choice, place, values, progress):
     """The boundary of the inside, from signed distances, and what is said of it."""
     local, grid, sides, said = choice.local, choice.grid, choice.single.sides, []
     meetings = choice.single.crossings.meetings
@@ -138,6 +141,8 @@ def _signed_surface(choice, values, progress):
         said.append(_said_of_missed(missed, "signed surface", "one of them is missing"))
     elif worst > 1 and choice.extracted_fit.worst < BETTER * worst:
         said.append("the signed surface is torn, as where walls run closer than the grid's cells; raise the resolution")
+    else:
+        said += _said_of_left_out(choice, mesh, "signed surface", place)
     if not sides.complete:
         said.append(
             f"{sides.share:.1%} of the surface has the same side on both faces (flaps, inner walls), where "
@@ -160,6 +165,18 @@ def _said_of_torn(local, grid):
         "sheets run closer than the cells of the grid, where a single layer is torn: the double cover is in its place; "
         "raise the resolution until they part"
     )
+
+
+def _said_of_left_out(choice, mesh, name, place):
+    """What a mesh lacks of a scene that it shows on the whole."""
+    points = choice.local.points
+    lacking = left_out(mesh, points, choice.grid.spacing)
+    if len(lacking) >= _LACKING:
+        yield (
+            f"at least {len(lacking)} of {len(points)} points lie more than a cell off the {name}, for instance near "
+            f"{spelt_out(place(lacking[:1])[0])}, as where it lacks thin parts; raise the resolution, or compare it "
+            "with the double cover"
+        )
 
 
 def _said_of_missed(missed, mesh, how):

@@ -79,17 +79,18 @@ def _refusal(sides, surface, place):
     if sides.within.mean() > 0.5 or not border.any():
         return (
             f"no signed distance: {sides.share:.0%} of the surface has the same side on both faces, as inner walls and "
-            f"one-sided surfaces have, for instance near {_text(place(sides.alike[:1])[0])}; set surface to single"
+            f"one-sided surfaces have, for instance near {spelt_out(place(sides.alike[:1])[0])}; set surface to single"
         )
     widest = np.where(border, surface.rims.opening, np.inf).argmin()
     raised = surface.bridge < options()["bridge"].metadata["limits"][1]
     close = f"raise bridge (now {surface.bridge:g}) until its holes close" if raised else "close its holes"
     return (
         f"the shape is not closed: the outside reaches both faces of {sides.share:.0%} of its surface, past "
-        f"{border.sum()} border samples, for instance near {_text(place(surface.points[[widest]])[0])}; set "
+        f"{border.sum()} border samples, for instance near {spelt_out(place(surface.points[[widest]])[0])}; set "
         f"surface to single, or {close}"
     )
 
 
-def _text(position):
+def spelt_out(position: np.ndarray) -> str:
+    """A position (3,) in a message."""
     return "({:.9g}, {:.9g}, {:.9g})".format(*position)

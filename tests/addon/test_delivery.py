@@ -587,7 +587,9 @@ def test_the_scan_is_shown_and_hidden_like_its_results(blender, run, scan):
     for hidden in (True, False):
         blender.ops.vad.show(role="source")
         assert (scan.hide_get(), scan.hide_render) == (hidden, hidden)
-    with pytest.raises(RuntimeError, match="Scan VAD has no sheet: it was deleted, or not asked for"):
+    with pytest.raises(
+        RuntimeError, match="Scan VAD has nothing to show for the single layer: it was deleted, or not asked for"
+    ):
         blender.ops.vad.show(role="sheet")
 
 

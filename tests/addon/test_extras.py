@@ -375,12 +375,16 @@ def test_freed_axes_are_gone(blender, extension, edited):
     assert constraints(blender, extension) is None
 
 
-@pytest.mark.parametrize("problem", ["length 0", "are selected"])
-def test_what_cannot_be_fixed_is_said(blender, edited, problem):
-    if problem == "are selected":
+@pytest.mark.parametrize(
+    ("z", "problem"),
+    [(0, "length 0 has no direction"), (np.nan, "length nan has"), (1, "are selected")],
+)
+def test_what_cannot_be_fixed_is_said(blender, extension, edited, z, problem):
+    if z == 1:
         blender.ops.mesh.select_all(action="DESELECT")
     with pytest.raises(RuntimeError, match=problem):
-        blender.ops.vad.fix_axes(origin="TYPED", axis=(0, 0, 0 if problem == "length 0" else 1))
+        blender.ops.vad.fix_axes(origin="TYPED", axis=(0, 0, z))
+    assert constraints(blender, extension) is None
 
 
 def test_fixed_axes_hold_in_the_run_and_live_in_the_file(blender, tmp_path, edited):

@@ -366,6 +366,10 @@ def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan
     for given in ("--no-outlier", "--outlier", "--memory-limt=640"):
         meant = {"--memory-limt=640": "--memory-limit"}.get(given, f"{given}s")
         assert f"{given} (is {meant} meant?)" in refused(capsys, "reconstruct", scan, "-o", "out", given)
+    for given, meant in (("--res", "--resolution"), ("--mem=640", "--memory-limit")):
+        assert f"{given} (is {meant} meant?)" in refused(capsys, "reconstruct", scan, "-o", "out", given)
+    for given in ("--signed", "--version", "--voxel"):
+        assert "meant" not in refused(capsys, "reconstruct", scan, "-o", "out", given)
     message = refused(capsys, "reconstruct", scan, "b.ply", "c.ply", "-o", "out")
     assert "b.ply c.ply; reconstruct takes one scan at a time" in message
     assert "python -m core info --help" in refused(capsys, "info", scan, "--zzz")

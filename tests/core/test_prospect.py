@@ -41,6 +41,14 @@ def test_the_resolution_that_suits_does_not_depend_on_the_one_asked():
     assert to_next / 10 < apart < to_next / 2
 
 
+def test_what_is_asked_for_whatever_the_offset_can_be_run():
+    for offset in (1.0, 1.7, 4.0):
+        settings = Settings(offset=offset)
+        suited = look_ahead(shapes.sphere(100), settings).suited
+        assert suited >= Settings(offset=offset, resolution=suited).coarsest
+    assert suited == settings.coarsest > look_ahead(shapes.sphere(100)).suited
+
+
 def test_without_lines_it_is_that_of_all_samples():
     points = shapes.sphere(800)
     assert look_ahead(points).suited == suited_resolution(points, local_spacing(points))

@@ -92,7 +92,12 @@ def test_no_band_is_none_by_either_name(word):
 @pytest.mark.parametrize(
     ("unfit", "remedy"),
     [
-        ({"resolution": 513}, "set band"),
+        ({"resolution": 513}, "set band, for instance to 4, or lower"),
+        ({"resolution": 513, "offset": 4}, "set band, for instance to 6, or lower"),
+        (
+            {"resolution": 513, "integration": "poisson", "diffusion": "grid"},
+            "set band, for instance to 4, and integration to transport, diffusion to kernel, or lower",
+        ),
         ({"band": 4, "integration": "poisson"}, "set integration to transport"),
         ({"band": 4, "offset": 2.5}, "band of 4.5 or more"),
         ({"resolution": 16, "offset": 2}, r"offset of 1\.6 or less, or a resolution of 20 or more"),

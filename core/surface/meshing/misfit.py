@@ -34,7 +34,7 @@ class Misfit(NamedTuple):
 
 def misfit(mesh: Mesh, surface: LocalSurface, cell: float) -> Misfit:
     """How badly a mesh fits the samples of a surface."""
-    off = distances(mesh, surface.points) / cell
+    off = distances(mesh, _some(surface.points)) / cell
     worst = max(off.mean() / _TORN, askew(mesh, surface.tree, surface.normals) / _ASKEW)
     return Misfit(worst, (off > OFF).mean())
 
@@ -51,21 +51,27 @@ def chamfer(mesh: Mesh, surface: LocalSurface, cell: float, points: np.ndarray |
     a, b, c = at_corners(mesh.vertices, _some(mesh.faces))
     area, off = lengths(face_normals(a, b, c)), surface.project(((a + b + c) / 3).T).distance
     points, total = surface.points if points is None else points, area.sum()
-    return (distances(mesh, points).mean() + off @ area / total) / cell if total else np.inf
+    return (distances(mesh, _some(points)).mean() + off @ area / total) / cell if total else np.inf
+
+
+def left_out(mesh: Mesh, points: np.ndarray, cell: float) -> np.ndarray:
+    """The samples (n,3) that are more than a cell off a mesh by :func:`distances`, (k,3), such as those of a thin part
+    that it lacks, which may be few of a large scene."""
+    apart = KDTree(mesh.vertices).query(points, distance_upper_bound=cell, workers=-1)[0]
+    far = points[np.isinf(apart)]
+    return far[distances(mesh, far) > cell] if len(far) else far
 
 
 def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """Distances of the samples (n,3), or of 4096 and more of them, to the mesh, in their units, (k,) float64; infinite
-    to one without faces.
+    """Distances of points (n,3) to the mesh, in their units, (n,) float64; infinite to one without faces.
 
     Measured to discs around the centroids of the nearest faces, as large as these: a little less than to the triangles.
     """
     if not len(mesh.faces):
-        return np.full(1, np.inf)
+        return np.full(len(points), np.inf)
     corners = np.stack(at_corners(mesh.vertices, mesh.faces))
     centre, normal = corners.mean(axis=0), unit_columns(face_normals(*corners))
     radius = np.max([lengths(corner - centre) for corner in corners], axis=0)
-    points = _some(points)
     row = k_nearest(quick_tree(centre.T), points, _FACES, workers=-1)[1]
     off = points.T[:, :, None] - centre[:, row]
     height = dots(off, normal[:, row])

@@ -144,7 +144,8 @@ def test_constraints_on_dropped_points_are_reported():
     [
         (3, "not \\(indices, axes\\)"),
         (([0], [[1, 0]]), "shapes \\(1,\\) and \\(1, 2\\)"),
-        (([0.5], [[1, 0, 0]]), "whole-number"),
+        (([0.5], [[1, 0, 0]]), "constraint indices are float64; give whole numbers"),
+        ((np.ones(4, bool), [[1, 0, 0]] * 4), r"are bool; .* of a mask what numpy.flatnonzero\(mask\) does"),
         (([0], [[0, 0, 0]]), "no direction"),
         (([0], [[np.nan, 0, 0]]), "no direction"),
         (([0, 1], [[1, 0, 0], [0, np.inf, 0]]), "^1 constraint axes have no direction"),

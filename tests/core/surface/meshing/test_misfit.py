@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from core import Mesh
-from core.surface.meshing.misfit import askew, chamfer, distances, misfit
+from core.surface.meshing.misfit import askew, chamfer, distances, left_out, misfit
 
 SQUARE = Mesh(np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
 
@@ -32,6 +32,16 @@ def test_agrees_with_exact_distances_to_the_triangles():
     points = mesh.vertices[rng.integers(0, len(x), 2000)] + rng.normal(0, 0.1, (2000, 3))
     exact = np.sqrt(igl.point_mesh_squared_distance(points, mesh.vertices, mesh.faces)[0]).mean()
     assert 0.9 * exact < distances(mesh, points).mean() <= 1.001 * exact
+
+
+def test_what_a_mesh_leaves_out_is_more_than_a_cell_off_it():
+    """Beside vertices a cell apart and beside faces that are much larger than a cell, of which some are far from any
+    vertex."""
+    points = np.random.default_rng(0).uniform([0, 0, -0.3], [1, 1, 0.3], (500, 3))
+    for cell in (1.0, 0.2, 0.05):
+        far = np.abs(points[:, 2]) > cell
+        np.testing.assert_array_equal(left_out(SQUARE, points, cell), points[far])
+    assert len(left_out(Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32)), points, 1.0)) == 500
 
 
 def test_no_faces():

@@ -1,5 +1,7 @@
 """The single layer by topology, closed form and repetition. Resolutions are those of the shared runs."""
 
+import re
+
 import igl
 import numpy as np
 import pytest
@@ -446,6 +448,25 @@ def test_a_single_layer_that_misses_many_samples_is_torn():
     np.testing.assert_array_equal(run.sheet.vertices, run.surface.vertices)
     assert len(shapes.components(run.sheet)) == 1
     assert any("the double cover is in its place" in warning for warning in run.report["warnings"])
+
+
+def test_parts_of_a_large_scene_that_are_torn_are_told():
+    """Of poles 1.2 cells thick on a floor, with a twentieth of the samples each; whole they are in finer cells."""
+    rng = np.random.default_rng(2)
+    scene = [np.column_stack([rng.uniform(-5, 5, (8000, 2)), np.zeros(8000)])]
+    for x in (-3, -1, 1, 3):
+        turn, z = rng.uniform(0, 2 * np.pi, 330), rng.uniform(0, 3, 330)
+        scene.append(np.column_stack([x + 0.06 * np.cos(turn), 0.06 * np.sin(turn), z]))
+    run = reconstruct(np.concatenate(scene), Settings(surface="single"))
+    (said,) = (warning for warning in run.report["warnings"] if "more than a cell off the single layer" in warning)
+    place = np.array(re.search(r"near \((.*)\), as", said)[1].split(", "), float)
+    off = np.sqrt(igl.point_mesh_squared_distance(run.points, run.sheet.vertices, run.sheet.faces)[0])
+    lacking = run.points[off > run.field.spacing]
+    assert 0.5 * len(lacking) < int(said.split()[2]) <= len(lacking)
+    assert KDTree(lacking).query(place)[0] < 1e-6
+    assert place[2] > 0.1
+    finer = reconstruct(np.concatenate(scene), Settings(surface="single", resolution=256))
+    assert not any("lacks thin parts" in warning for warning in finer.report["warnings"])
 
 
 def test_where_points_are_too_few_for_a_single_layer_no_finer_grid_is_advised():
