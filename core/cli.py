@@ -171,7 +171,7 @@ def _parser():
     command.add_argument("--json", action="store_true", help="print the report and the files written as JSON")
     command.set_defaults(run=_reconstruct, command="reconstruct", spelt=command.spelt())
 
-    text = "say what a scan holds and how large a cell would be"
+    text = "say what a scan holds, which resolution suits it, and what time and memory a run would take"
     command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
     command.add_argument("scan", metavar="SCAN", type=_path, help=formats)
     _add_settings(command, {name: options()[name] for name in ("resolution", "band", "surface")})

@@ -142,9 +142,9 @@ class Settings:
     )
     outliers: bool = _option(
         True,
-        "Drop stray points far from any surface, the few that lie further from all others than these from each other, "
-        "those inside a solid that points fill, and most of lines whose points lie much closer than cells and the next "
-        "line; what is dropped is said",
+        "Drop stray points far from any surface, a few that lie further from all others than these do from each other, "
+        "those inside a solid that points fill, and most points of lines along which they lie much closer than a cell "
+        "is wide and the next line is away; what is dropped is said",
     )
     denoise: float | str = _option(
         "auto",
@@ -165,7 +165,7 @@ class Settings:
     seed: int = _option(
         0,
         "Seed of the tiny jitter that keeps the Voronoi diagram of regular grids fast, and of the samples that noise "
-        "is measured on; same seed, same bytes",
+        "is measured on; same seed, same results",
         limits=(0, 2**31 - 1),
     )
 

@@ -87,7 +87,8 @@ def _selected(context):
 
 
 class VAD_OT_estimate(run.Run, bpy.types.Operator):
-    """Show how long the run would take, how much memory it would need, and which resolution suits the points"""
+    """Show how long the run would take with the usual solver, how much memory it would need, and which resolution suits
+    the points"""
 
     bl_idname = "vad.estimate"
     bl_label = "Estimate Cost"

@@ -25,7 +25,7 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
     foot      : (b,3) float64, the point of the surface that the distance is measured to
 
     Of a field in a band there are, in place of the first two, blocks of 8^3 nodes; nodes elsewhere are further from the
-    surface than `band`:
+    surface than `band`. At the sides of the box blocks reach past `shape`; entries there mean nothing, so cut them off:
 
     block     : (k,3) int32, indices (i,j,k) of the lowest node of each     shape : (3,) int64, nodes of the whole box
     values    : (k,8,8,8) float32                                           band  : float64, its half width

@@ -105,5 +105,5 @@ def test_blocks_give_the_surface_of_the_whole_box(level):
 
 def test_blocks_need_openvdb(monkeypatch):
     monkeypatch.setattr(MODULE, "load_openvdb", missing)
-    with pytest.raises(MissingDependency, match=r"band needs OpenVDB.*set band to none, or surface to none"):
+    with pytest.raises(MissingDependency, match=r"band needs OpenVDB.*set band to none, with a resolution of 512"):
         isosurface(in_blocks(np.minimum(ball(), 3)), 1.0)
