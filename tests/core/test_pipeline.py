@@ -320,7 +320,7 @@ def test_what_refuses_to_be_an_array_is_named():
         (([0],), "constraints are not"),
         (([0, 1], EYE[:1]), r"\(2,\).*\(1, 3\)"),
         (([0], [[1, 0]]), r"\(1,\).*\(1, 2\)"),
-        (([0.5], EYE[:1]), "whole-number"),
+        (([0.5], EYE[:1]), "give whole numbers"),
         (([[0]], EYE[:1]), r"\(1, 1\)"),
         (([0, 1], [[0, 0, 0], [1, 0, 0]]), "1 constraint axes have no direction"),
         (([0], [[np.nan, 0, 0]]), "1 constraint axes have no direction"),
