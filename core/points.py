@@ -138,8 +138,9 @@ def local_spacing(points: np.ndarray, progress=None) -> np.ndarray:
 
 def refuse_copies(points: np.ndarray) -> None:
     """Raises :class:`InputError` where points (n,3) occur twice."""
-    n = len(points)
-    if len(np.unique(points[:, 0])) < n and (distinct := len(first_of_each(points, np.arange(n)))) < n:
+    n, (x, y, z) = len(points), points.T
+    along = x + np.e * y + np.pi * z  # alike for copies, hardly ever for others
+    if len(np.unique(along)) < n and (distinct := len(first_of_each(points, np.arange(n)))) < n:
         raise InputError(
             f"some points occur twice: {distinct} of {n} are distinct; give each of them once, as "
             "numpy.unique(points, axis=0) does"

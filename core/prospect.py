@@ -9,7 +9,7 @@ from .cleaning.noise import looks_noisy
 from .field.grid import fit_grid
 from .points import Samples, prepare_samples
 from .progress import Progress
-from .settings import Settings, options
+from .settings import Settings
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ def look_ahead(points, settings: Settings = Settings(), progress=None) -> Prospe
 
 def _suited(samples, thinned, every, settings, progress):
     """The resolution that suits what the coarsest grid leaves of dense lines."""
-    limits = options()["resolution"].metadata["limits"]
-    coarsest = replace(settings, denoise=0.0, surface="none", resolution=limits[0])
+    cleaned = replace(settings, denoise=0.0, surface="none")
+    coarsest = replace(cleaned, resolution=cleaned.coarsest)
     if settings.outliers and not thinned:
         cell = fit_grid(samples.points, coarsest.resolution).spacing
         thinned = not thinned_lines(samples.points, cell, progress.part(0.0, 0.3)).all()

@@ -160,15 +160,14 @@ class VAD_OT_show(bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        return next(f"Show or hide {text}" for role, _, text in results.SHOWN if role == properties.role)
+        return f"Show or hide {_in_words(properties.role)}"
 
     def execute(self, context):
         collection, there = chosen_result(context), context.scene.objects
         objects = [obj for obj in results.shown_as(collection, self.role) if results.is_among(obj, there)]
         if not objects:
-            text = next(text for role, _, text in results.SHOWN if role == self.role)
             why = "deleted" if self.role == "source" else "deleted, or not asked for"
-            self.report({"ERROR"}, f"{collection.name} has nothing to show for {text}: it was {why}")
+            self.report({"ERROR"}, f"{collection.name} has nothing to show for {_in_words(self.role)}: it was {why}")
             return {"CANCELLED"}
         shown = not all(obj.visible_get() for obj in objects)
         for obj in objects:
@@ -179,6 +178,11 @@ class VAD_OT_show(bpy.types.Operator):
             if obj.library is not None:
                 self.report({"WARNING"}, f"{obj.name} is linked: whether renders show it is set in its own file")
         return {"FINISHED"}
+
+
+def _in_words(role):
+    """What is shown and hidden by this name."""
+    return next(text for name, _, text in results.SHOWN if name == role)
 
 
 def _without_file(obj):

@@ -591,6 +591,9 @@ def test_the_scan_is_shown_and_hidden_like_its_results(blender, run, scan):
         RuntimeError, match="Scan VAD has nothing to show for the single layer: it was deleted, or not asked for"
     ):
         blender.ops.vad.show(role="sheet")
+    blender.data.objects.remove(scan)
+    with pytest.raises(RuntimeError, match=r"nothing to show for what the points came from: it was deleted$"):
+        blender.ops.vad.show(role="source")
 
 
 def put_out_of_sight(how, obj, layer):

@@ -5,6 +5,7 @@ import numpy as np
 from ...errors import MissingDependency
 from ...field.blocks import Blocks
 from ...io.openvdb_module import fill, load_openvdb
+from ...settings import WHOLE_BOX
 
 
 def isosurface(values: np.ndarray | Blocks, level: float) -> tuple[np.ndarray, np.ndarray]:
@@ -20,8 +21,8 @@ def isosurface(values: np.ndarray | Blocks, level: float) -> tuple[np.ndarray, n
     except MissingDependency as error:
         if isinstance(values, Blocks):
             raise MissingDependency(
-                f"a surface from a band needs OpenVDB: {error}; or set band to none, with a resolution of 512 at most, "
-                "or surface to none"
+                f"a surface from a band needs OpenVDB: {error}; or set band to none, with a resolution of {WHOLE_BOX} "
+                "at most, or surface to none"
             ) from error
         return _by_marching_cubes(values, level)
     beyond = values.outer.max() if isinstance(values, Blocks) else values.max()
