@@ -16,14 +16,14 @@ The paper has no such step. Where there is no crease it changes nothing at all.
 from functools import partial
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..linalg import row_dots, unit
 from ..lookup import mask_of
 from ..parallel import in_order
 from ..progress import Progress
+from .around import Around
 from .mirrors import Mirrors
-from .planes import neighbourhoods, onto_planes
+from .planes import onto_planes
 from .reflection import sweeps_over
 from .shared_planes import onto_shared_planes
 
@@ -37,7 +37,6 @@ _LEAST_TURN = 0.2  # radians
 _ROUNDS, _SWEEPS = 4, 6
 _ACROSS = 0.2  # sine between axis and image, from which neighbours beside a crease are on different sheets
 _RISEN = 0.4  # sine by which they rise out of the plane, from which they are, too: the inside of a wedge lies between
-_CHUNK = 256  # samples
 
 
 def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), progress=None):
@@ -54,20 +53,20 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
     moved, held = np.zeros(len(points), bool), fixed
     agreed, suspect = agreed_share(mirrors, normals, held)
     if suspect.any():
-        here, tree = mirrors.at(mirrors.and_around(suspect)), KDTree(points)
+        here, around = mirrors.at(mirrors.and_around(suspect)), Around(points, spacing, mirrors.stretch)
         apart = ~mirrors.and_around(fixed)
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
             leaning = (mirrors.confidence(normals) < _UPRIGHT) & apart
             suspect = agreed_share(here, normals, fixed)[1]
-            normals, flat = onto_planes(points, spacing, tree, normals, suspect, leaning)
-            normals, bent = _onto_sheets(points, spacing, tree, here, normals, held, agreed, part)
+            normals, flat = onto_planes(around, normals, suspect, leaning)
+            normals, bent = _onto_sheets(around, here, normals, held, agreed, part)
             if not (flat | bent).any():
                 break
             moved = moved | flat | bent
             beside = mirrors.and_around(moved)
             swept = mirrors.and_around(beside) & ~held
             normals = sweeps_over(_parted(mirrors.at(swept), normals, beside), normals, swept, _SWEEPS)
-            normals, shared = onto_shared_planes(points, spacing, tree, mirrors, normals, ~fixed)
+            normals, shared = onto_shared_planes(around, mirrors, normals, ~fixed)
             held, moved = held | shared, moved | shared
     parted = _parted(mirrors, normals, mirrors.and_around(moved)) if moved.any() else mirrors
     return normals, parted.confidence(normals), moved
@@ -75,27 +74,26 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
 
 def agreed_share(mirrors, normals, held):
     """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
-    agreed = mirrors.gather @ _alike(mirrors.cosines(normals))
-    rise = mirrors.gather @ np.abs(mirrors.rises(normals))
+    agreed, rise = mirrors.means_aside(_alike(mirrors.cosines(normals)), np.abs(mirrors.rises(normals)))
     return agreed, (agreed < _AGREED) & (rise > _STEEP) & ~held
 
 
-def _onto_sheets(points, spacing, tree, mirrors, normals, held, agreed, progress):
+def _onto_sheets(around, mirrors, normals, held, agreed, progress):
     """The axes after those of samples beside creases are taken to one sheet's normal, and which these are; all have
     their neighbours in `mirrors`. `agreed` (n,) holds for the others, and takes in place what these find."""
-    normals, moved, here = normals.copy(), np.zeros(len(points), bool), np.unique(mirrors.site)
+    normals, moved, here = normals.copy(), np.zeros(len(normals), bool), np.unique(mirrors.site)
     changed = ~moved
     for _ in range(_ROUNDS):
         found, suspect = agreed_share(mirrors, normals, held)
         agreed[here] = found[here]
-        row = np.flatnonzero(suspect & mirrors.and_around(mirrors.and_around(changed)))
-        look = partial(_densest, points=points, spacing=spacing, tree=tree, normals=normals, agreed=agreed)
-        parts = (row[some] for some in progress.chunks(len(row), _CHUNK))
-        axes = np.concatenate([np.empty((0, 3)), *(axes for _, axes in in_order(look, parts))])
+        parts = around.parts(np.flatnonzero(suspect & mirrors.and_around(mirrors.and_around(changed))))
+        look = partial(_densest, around=around, normals=normals, agreed=agreed)
+        axes = np.concatenate([np.empty((0, 3)), *(axes for _, axes in in_order(look, progress.each(parts)))])
+        row = np.concatenate([np.empty(0, np.int64), *parts])
         turned = np.abs(row_dots(axes, normals[row])) < np.cos(_LEAST_TURN)
         if not turned.any():
             break
-        changed = mask_of(row[turned], len(points))
+        changed = mask_of(row[turned], len(normals))
         normals[changed] = axes[turned]
         moved |= changed
     return normals, moved
@@ -111,10 +109,10 @@ def _across(mirrors, normals):
     return (1 - mirrors.cosines(normals) ** 2 > _ACROSS**2) | (np.abs(mirrors.rises(normals)) > _RISEN)
 
 
-def _densest(row, points, spacing, tree, normals, agreed):
+def _densest(row, around, normals, agreed):
     """The axes (r,3) that most of the images around samples `row` (r,) agree with; the present ones where they are no
     better founded."""
-    other, direction, near = neighbourhoods(row, points, spacing, tree)
+    other, direction, near = around.neighbours(row)
     images = normals[other]
     images -= 2 * row_dots(images, direction)[..., None] * direction
     weight = near * np.maximum(agreed[other], np.finfo(float).tiny)

@@ -10,7 +10,7 @@ from ..progress import Progress
 from ..settings import Settings
 from ..voronoi.bisectors import bisector_samples
 from ..voronoi.facets import voronoi_facets
-from ..voronoi.lines import spacing_across_lines
+from ..voronoi.lines import across_lines
 from ..voronoi.polygons import facet_polygons
 from .adam import minimise
 from .creases import normals_of_sheets
@@ -53,9 +53,9 @@ def estimate_normals(points, spacing, settings: Settings = Settings(), constrain
     refuse_copies(points)
     if settings.solver == "energy":
         return _least_energy(points, spacing, settings, constraints, progress)
-    heeded = spacing_across_lines(points, spacing, progress.part(0.0, 0.02))
+    heeded, stretch = across_lines(points, spacing, progress.part(0.0, 0.02))
     facets = voronoi_facets(points, heeded, settings.seed, progress.part(0.02, 0.7))
-    mirrors = Mirrors(points, heeded, facets, progress.part(0.7, 0.75))
+    mirrors = Mirrors(points, heeded, facets, stretch, progress.part(0.7, 0.75))
     normals, confidence, report = swept_normals(points, spacing, mirrors, constraints, None, progress.part(0.75, 1.0))
     return normals, confidence, {"facets": len(facets.pairs), **report}
 
@@ -74,7 +74,7 @@ def swept_normals(points, spacing, mirrors: Mirrors, constraints=None, start=Non
 
 def _least_energy(points, spacing, settings, constraints, progress):
     backend, device = _backend(settings)
-    spacing = spacing_across_lines(points, spacing)
+    spacing, _ = across_lines(points, spacing)
     polygons = facet_polygons(points, spacing, settings.seed, progress.part(0.0, 0.1))
     samples = bisector_samples(polygons, spacing, seed=settings.seed)
     progress(0.2)

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from ..linalg import COMPONENTS, dots, principal_axes
+from ..neighbourhoods.stretch import Stretch
 from ..progress import Progress
 from ..voronoi.facets import CLIP_RADIUS, Facets
 
@@ -19,6 +20,7 @@ class Mirrors:
     points  : (n,3) float64
     spacing : (n,) float64, local spacing of each sample, units of `points`
     facets  : Facets between them
+    stretch : how the samples lie closer along lines, or None
 
     site, other, weight : (p,), a sample, one of its neighbours and that one's weight
     direction : (3,p) float64, unit vectors from the one to the other
@@ -35,8 +37,10 @@ class Mirrors:
     on a plane of points 60 times as far apart, mean 1 - |n.n_true| was .0022, now .0002.
     """
 
-    def __init__(self, points: np.ndarray, spacing: np.ndarray, facets: Facets, progress=None):
-        progress = Progress.of(progress)
+    def __init__(
+        self, points: np.ndarray, spacing: np.ndarray, facets: Facets, stretch: Stretch | None = None, progress=None
+    ):
+        progress, self.stretch = Progress.of(progress), stretch
         progress(0.0)
         self.site, self.other = np.concatenate([facets.pairs, facets.pairs[:, ::-1]]).T
         step = points[self.other] - points[self.site]
@@ -104,6 +108,15 @@ class Mirrors:
     def confidence(self, normals: np.ndarray) -> np.ndarray:
         """(n,) in [0,1], mean squared cosine between an axis and the mirror images of its neighbours."""
         return np.clip(self.gather @ self.cosines(normals) ** 2, 0.0, 1.0)
+
+    def means_aside(self, *values: np.ndarray) -> list[np.ndarray]:
+        """Means (n,) of values (p,) over the neighbours of each sample, those ahead and behind on its line left out."""
+        if self.stretch is None:
+            return [self.gather @ each for each in values]
+        weight, count = self.weight * self.stretch.aside(self.site, self.direction.T), self.gather.shape[0]
+        total = np.bincount(self.site, weights=weight, minlength=count)
+        weight = weight / np.where(total > 0, total, 1.0)[self.site]
+        return [np.bincount(self.site, weights=weight * each, minlength=count) for each in values]
 
     def _tensors(self, vectors):
         return np.stack([self.gather @ (vectors[a] * vectors[b]) for a, b in COMPONENTS], axis=1)

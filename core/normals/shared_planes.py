@@ -8,13 +8,12 @@ and at their corners those of each sheet are few. Chance, and curved sheets, har
 from functools import partial
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from ..linalg import dots, row_dots, unit
 from ..lookup import mask_of
 from ..parallel import in_order
+from .around import Around
 from .mirrors import Mirrors
-from .planes import neighbourhoods, parts_of
 
 _INSIDE = 0.004  # sine by which a sample may rise out of the plane of a neighbour
 _ALIKE = np.cos(0.02)  # cosine between axes of one plane
@@ -24,18 +23,17 @@ _WEDGE = 0.2  # least sine of the angle between two of them: all of a straight l
 _ROUNDS = 4  # for those that share the planes of others once these are right
 
 
-def onto_shared_planes(points, spacing, tree: KDTree, mirrors: Mirrors, normals, free):
+def onto_shared_planes(around: Around, mirrors: Mirrors, normals, free):
     """The axes (n,3) after those of samples are taken to the plane that most of their neighbours share with them, and
     which these are, (n,) bool.
 
-    points : (n,3) float64     spacing : (n,) local spacing     tree : of the points     mirrors : of the points
-    free   : (n,) bool, samples whose axes may change
+    around, mirrors : of all samples     free : (n,) bool, samples whose axes may change
     """
-    moved = np.zeros(len(points), bool)
+    moved = np.zeros(len(normals), bool)
     for _ in range(_ROUNDS):
-        turned, changed = normals.copy(), np.zeros(len(points), bool)
-        look = partial(_most_shared, points=points, spacing=spacing, tree=tree, normals=normals)
-        for _, (row, axes) in in_order(look, parts_of(free & _offered(mirrors, normals))):
+        turned, changed = normals.copy(), np.zeros(len(normals), bool)
+        look = partial(_most_shared, around=around, normals=normals)
+        for _, (row, axes) in in_order(look, around.parts(np.flatnonzero(free & _offered(mirrors, normals)))):
             turned[row], changed[row] = axes, True
         if not changed.any():
             break
@@ -52,10 +50,10 @@ def _offered(mirrors, normals):
     return mask_of(mirrors.site[pair[unlike]], len(normals))
 
 
-def _most_shared(row, points, spacing, tree, normals):
+def _most_shared(row, around, normals):
     """Those of the samples `row` (r,) that share another plane with enough of their neighbours, and its axis for each,
     (m,) and (m,3)."""
-    other, direction, _ = neighbourhoods(row, points, spacing, tree)
+    other, direction, _ = around.neighbours(row)
     theirs, own = normals[other], normals[row]
     inside = np.abs(row_dots(theirs, direction)) < _INSIDE
     alike = (np.abs(theirs @ theirs.transpose(0, 2, 1)) > _ALIKE) & inside[:, None] & inside[:, :, None]

@@ -7,7 +7,7 @@ from core import Settings, reconstruct
 from core.normals.estimate import estimate_normals
 from core.points import local_spacing
 from core.voronoi.facets import REACH
-from core.voronoi.lines import spacing_across_lines
+from core.voronoi.lines import across_lines
 from tests import shapes
 
 STEP = 0.01
@@ -44,12 +44,12 @@ def test_the_energy_finds_them_too():
 def test_facets_reach_the_next_line_and_not_much_farther():
     points, _ = lines(12)
     spacing = local_spacing(points)
-    found = spacing_across_lines(points, spacing)
+    found = across_lines(points, spacing)[0]
     assert (REACH * found > 12 * STEP).mean() > 0.95
     assert (REACH * found).max() < 2 * 12 * STEP
-    np.testing.assert_allclose(spacing_across_lines(7 * points, 7 * spacing), 7 * found, rtol=1e-12)
+    np.testing.assert_allclose(across_lines(7 * points, 7 * spacing)[0], 7 * found, rtol=1e-12)
     order = np.random.default_rng(0).permutation(len(points))
-    np.testing.assert_allclose(spacing_across_lines(points[order], spacing[order]), found[order], rtol=1e-12)
+    np.testing.assert_allclose(across_lines(points[order], spacing[order])[0], found[order], rtol=1e-12)
 
 
 def test_a_ring_looks_past_itself():
@@ -57,7 +57,7 @@ def test_a_ring_looks_past_itself():
     turn = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     ring = 0.1 * np.stack([np.cos(turn), np.sin(turn), np.zeros(60)], axis=1)
     points = np.concatenate([ring + np.array([0, 0, z]) for z in (0, 0.15, 0.3)])
-    assert (REACH * spacing_across_lines(points, local_spacing(points)) > 0.15).all()
+    assert (REACH * across_lines(points, local_spacing(points))[0] > 0.15).all()
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_ring_looks_past_itself():
 )
 def test_elsewhere_nothing_changes(points):
     spacing = local_spacing(points)
-    assert spacing_across_lines(points, spacing).tobytes() == spacing.tobytes()
+    assert across_lines(points, spacing)[0].tobytes() == spacing.tobytes()
 
 
 @pytest.mark.parametrize("gap", [5, 6, 8])
