@@ -13,6 +13,7 @@ from ..points import SPACING_NEIGHBOURS
 _NEIGHBOURS, _ON_LINES = 20, 64
 _WIDTH = 1.7  # of the Gaussian of their distance, local spacings
 _CHUNK = 256  # samples
+_ASIDE = 0.7  # sine between a line and the way to its side, at least
 _LEAST = 1e-9  # weight of what lies in a plane
 _SEVERAL = 0.2  # deviation of what lies in one plane from one line in it, distances to the next line
 
@@ -58,12 +59,22 @@ class Around:
             return np.ones(axes.shape[:2], bool)
         along = self.stretch.along[row, None]
         step = self.points[other] - self.points[row, None]
-        weight = weight * (1 - row_dots(direction, along)[:, None] ** 2)
+        weight = weight * (1 - self._along(row, direction)[:, None] ** 2)
         total = np.maximum(weight.sum(axis=2), _LEAST)
         aside = np.cross(along, axes) @ step.transpose(0, 2, 1)
         mean = (weight * aside).sum(axis=2) / total
         deviation = (weight * (aside - mean[..., None]) ** 2).sum(axis=2) / total
         return deviation > (_SEVERAL * self.stretch.across[row, None]) ** 2
+
+    def aside(self, row, direction):
+        """Whether unit directions (r,k,3) from samples `row` (r,) of a part lead to the side of the lines that these are
+        on, (r,k) bool, true where they are on none."""
+        if not self._are_on_lines(row):
+            return np.ones(direction.shape[:2], bool)
+        return self._along(row, direction) ** 2 < 1 - _ASIDE**2
+
+    def _along(self, row, direction):
+        return row_dots(direction, self.stretch.along[row, None])
 
     def _are_on_lines(self, row):
         return self.stretch is not None and self.stretch.ratio[row[0]] > 1

@@ -19,6 +19,7 @@ _INSIDE, _EXACTLY = 0.007, 0.001  # of the Gaussian of the sine by which neighbo
 _SHARE = 0.35  # least share of the neighbours, by weight, in a plane
 _GAIN = 0.1  # by which it must exceed the share in that of the present axis
 _FEWEST = 6.0  # neighbours that must lie in it
+_ALIKE = 0.2  # their mean squared cosine with its axis, at least: lines on a wavy sheet lie in planes as well
 
 
 def onto_planes(around: Around, normals, suspect, leaning):
@@ -49,7 +50,9 @@ def _fullest(row, around, normals, within):
     inside = np.exp(-0.5 * (axes @ direction.transpose(0, 2, 1) / within) ** 2)
     share = np.einsum("rtk,rk->rt", inside, near)
     share[:, 1:][sine < _WEDGE] = 0
-    share *= around.tell(row, other, direction, axes, inside * near[:, None])
+    weight = inside * near[:, None]
+    alike = np.einsum("rtk,rtk->rt", weight, (axes @ normals[other].transpose(0, 2, 1)) ** 2)
+    share *= around.tell(row, other, direction, axes, weight) & (alike >= _ALIKE * weight.sum(axis=2))
 
     every, best = np.arange(len(row)), share.argmax(axis=1)
     most = share[every, best]

@@ -65,5 +65,6 @@ def _most_shared(row, around, normals):
     more = shared.sum(axis=1) >= present.sum(axis=1) + _MORE
     along = row_dots(direction, direction[every, best][:, None])
     wide = np.where(shared, 1 - along**2, 0.0).max(axis=1) > _WEDGE**2
+    wide &= (shared & around.aside(row, direction)).any(axis=1)
     founded = more & wide & (np.abs(row_dots(axes, own)) < _UNLIKE)
     return row[founded], axes[founded]
