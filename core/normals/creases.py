@@ -94,7 +94,7 @@ def _onto_sheets(around, mirrors, normals, held, agreed, progress):
         if not turned.any():
             break
         changed = mask_of(row[turned], len(normals))
-        normals[changed] = axes[turned]
+        normals[row[turned]] = axes[turned]
         moved |= changed
     return normals, moved
 
