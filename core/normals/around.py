@@ -41,7 +41,7 @@ class Around:
         """The neighbours of samples `row` (r,) of a part, nearest first: their numbers (r,k), the unit directions to
         them (r,k,3), and how near they are, (r,k) in [0,1]. On lines these are as many to the side as along them, and
         more: a plane that two lines lie in tells nothing."""
-        if self._are_on_lines(row):
+        if self.are_on_lines(row):
             distance, other = self.stretch.nearest(row, self.points, self.tree, _ON_LINES)
             spacing = distance[:, :SPACING_NEIGHBOURS].mean(axis=1)
         else:
@@ -55,7 +55,7 @@ class Around:
         """Whether what lies in planes with unit axes (r,t,3) through samples `row` (r,) of a part tells that these are
         planes of the surface, (r,t) bool: any two lines lie in one, so that on lines there have to be more. In a plane
         lie the neighbours `other` (r,k), in unit directions (r,k,3), by weights (r,t,k)."""
-        if not self._are_on_lines(row):
+        if not self.are_on_lines(row):
             return np.ones(axes.shape[:2], bool)
         along = self.stretch.along[row, None]
         step = self.points[other] - self.points[row, None]
@@ -69,12 +69,13 @@ class Around:
     def aside(self, row, direction):
         """Whether unit directions (r,k,3) from samples `row` (r,) of a part lead to the side of the lines that these are
         on, (r,k) bool, true where they are on none."""
-        if not self._are_on_lines(row):
+        if not self.are_on_lines(row):
             return np.ones(direction.shape[:2], bool)
         return self._along(row, direction) ** 2 < 1 - _ASIDE**2
 
     def _along(self, row, direction):
         return row_dots(direction, self.stretch.along[row, None])
 
-    def _are_on_lines(self, row):
+    def are_on_lines(self, row):
+        """Whether the samples `row` of a part are."""
         return self.stretch is not None and self.stretch.ratio[row[0]] > 1

@@ -18,7 +18,7 @@ _WEDGE = 0.3  # least sine of the angle between two
 _INSIDE, _EXACTLY = 0.007, 0.001  # of the Gaussian of the sine by which neighbours rise out of a plane
 _SHARE = 0.35  # least share of the neighbours, by weight, in a plane
 _GAIN = 0.1  # by which it must exceed the share in that of the present axis
-_FEWEST = 6.0  # neighbours that must lie in it
+_FEWEST, _FEWEST_ON_LINES = 6.0, 12.0  # neighbours that must lie in it
 _ALIKE = 0.2  # their mean squared cosine with its axis, at least: lines on a wavy sheet lie in planes as well
 
 
@@ -56,5 +56,6 @@ def _fullest(row, around, normals, within):
 
     every, best = np.arange(len(row)), share.argmax(axis=1)
     most = share[every, best]
-    founded = (most > share[:, 0] + _GAIN) & (most > _SHARE) & (inside[every, best].sum(axis=1) > _FEWEST)
+    enough = inside[every, best].sum(axis=1) > np.where(around.are_on_lines(row), _FEWEST_ON_LINES, _FEWEST)
+    founded = (most > share[:, 0] + _GAIN) & (most > _SHARE) & enough
     return axes[every, best], founded
