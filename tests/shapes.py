@@ -118,6 +118,27 @@ def scattered_box(n: int, size) -> np.ndarray:
     return scattered_rectangles([*lower, *((end, np.array(size)) for end in ends)], n)
 
 
+def cut_box(direction, step: float, between: float, size=(1.0, 0.8, 0.6)) -> tuple[np.ndarray, np.ndarray]:
+    """Where planes at right angles to a direction, `between` apart, cut the faces of the box [0, size], samples `step`
+    apart, and the normals there."""
+    rng, direction, size = np.random.default_rng(0), np.divide(direction, np.linalg.norm(direction)), np.array(size)
+    points, normals = [], []
+    for axis, side in np.ndindex(3, 2):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        slope = direction[[u, v]]
+        if not slope.any():
+            continue
+        face, steep = side * size[axis] * direction[axis], np.linalg.norm(slope)
+        place = (np.arange(-2, 2, between) + 0.37 * between - face) / steep**2
+        along = np.arange(-2, 2, step) + step * rng.random((len(place), 1))
+        on = place[:, None, None] * slope + along[..., None] * [-slope[1] / steep, slope[0] / steep]
+        on = on[((on > 0) & (on < size[[u, v]])).all(axis=2)]
+        points.append(np.full((len(on), 3), side * size[axis]))
+        points[-1][:, [u, v]] = on
+        normals.append(np.broadcast_to(np.eye(3)[axis], (len(on), 3)))
+    return np.concatenate(points), np.concatenate(normals)
+
+
 def sphere_distance(x: np.ndarray, radius: float = 1.0) -> np.ndarray:
     return np.abs(np.linalg.norm(x, axis=1) - radius)
 

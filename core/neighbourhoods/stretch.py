@@ -17,7 +17,7 @@ from ..trees import k_nearest
 from .lines import Lines
 
 _BESIDE = 20  # of a sample on a line, that may be on one that does not look it
-_AROUND = 32  # whose median tells how far apart lines are, and samples along them
+_AROUND = 64  # whose median tells how far apart lines are, and samples along them
 _TRIED = 8  # nearest, two of which are those before and behind on the line
 _STRAIGHT = 0.98  # least cosine between the ways there
 _FAR = 1.6  # times as far as on the lines around, at most, are these

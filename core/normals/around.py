@@ -67,8 +67,8 @@ class Around:
         return deviation > (_SEVERAL * self.stretch.across[row, None]) ** 2
 
     def aside(self, row, direction):
-        """Whether unit directions (r,k,3) from samples `row` (r,) of a part lead to the side of the lines that these are
-        on, (r,k) bool, true where they are on none."""
+        """Whether unit directions (r,k,3) from samples `row` (r,) of a part lead to the side of their lines, (r,k)
+        bool; true where these are on none."""
         if not self.are_on_lines(row):
             return np.ones(direction.shape[:2], bool)
         return self._along(row, direction) ** 2 < 1 - _ASIDE**2

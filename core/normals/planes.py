@@ -4,6 +4,9 @@ On a crease the axes around a sample say little: those of two sheets are there, 
 and those next to it that lean on these. Of the samples on the edges of a cube's lattice the sweeps took most to the
 plane that halves the solid along the edge. Where the sheets are flat, the places tell: many of the neighbours lie in
 one plane with the sample, to within rounding, which chance does not do.
+
+Lines that a surface was cut by lie in planes, too, those of the cuts, and any two lines side by side in another. In the
+former the axes of all neighbours are at right angles to that of the plane; in the latter there is no third line.
 """
 
 from functools import partial

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
 from core import Settings, reconstruct
+from core.normals.around import Around
 from core.normals.planes import onto_planes
 from core.points import local_spacing
 from tests import shapes
@@ -17,7 +17,7 @@ def box_lattice(*cells: int) -> np.ndarray:
 
 def moved_from(axes, points):
     every = np.ones(len(points), bool)
-    return onto_planes(points, local_spacing(points), KDTree(points), axes, every, ~every)
+    return onto_planes(Around(points, local_spacing(points)), axes, every, ~every)
 
 
 @pytest.mark.parametrize("n", [6, 10, 16])
@@ -90,7 +90,7 @@ def test_leaning_axes_go_to_exact_planes_alone(rough, moves, random):
     flat = random.uniform(-1, 1, (800, 2))
     points = np.column_stack([flat, rough * random.uniform(-1, 1, 800)])
     every, tilted = np.ones(800, bool), np.tile([0.06, 0.0, 1.0], (800, 1))
-    axes, moved = onto_planes(points, local_spacing(points), KDTree(points), tilted, ~every, every)
+    axes, moved = onto_planes(Around(points, local_spacing(points)), tilted, ~every, every)
     assert moved.mean() == moves
     np.testing.assert_allclose(np.abs(axes), [0, 0, 1.0] * every[:, None] if moves else tilted, atol=1e-9)
 
@@ -99,7 +99,7 @@ def test_samples_that_are_not_suspect_and_lines_stay(random):
     points = np.pad(random.uniform(-1, 1, (500, 2)), ((0, 0), (0, 1)))
     tilted = np.tile([0.6, 0.0, 0.8], (500, 1))
     suspect = points[:, 0] > 0
-    axes, moved = onto_planes(points, local_spacing(points), KDTree(points), tilted, suspect, np.zeros_like(suspect))
+    axes, moved = onto_planes(Around(points, local_spacing(points)), tilted, suspect, np.zeros_like(suspect))
     np.testing.assert_array_equal(moved, suspect)
     np.testing.assert_array_equal(axes[~suspect], tilted[~suspect])
     np.testing.assert_allclose(np.abs(axes[suspect]), np.tile([0, 0, 1.0], (suspect.sum(), 1)), atol=1e-9)

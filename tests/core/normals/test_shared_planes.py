@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from scipy.spatial import KDTree
 
+from core.normals.around import Around
 from core.normals.shared_planes import onto_shared_planes
 from core.points import local_spacing
 from tests import shapes
@@ -11,7 +11,7 @@ from tests.core.normals.test_creases import degrees, off_all_faces, parted, roof
 def moved_from(points, axes, free=None):
     spacing, mirrors, _ = swept(points)
     free = np.ones(len(points), bool) if free is None else free
-    return onto_shared_planes(points, spacing, KDTree(points), mirrors, axes, free)
+    return onto_shared_planes(Around(points, spacing), mirrors, axes, free)
 
 
 def random_axes(count, rng):
