@@ -12,6 +12,7 @@ from . import attributes, results
 from .attributes import Attribute
 
 READABLE = {"MESH", "POINTCLOUD", "CURVES", "CURVE"}
+_LARGE = 10  # times the area for each vertex, at least, is that of the mean face by area of what is no scan
 AXIS = "vad_axis"  # attribute that holds the normal's axis where the user fixed it, in the object's space, else zeros
 
 
@@ -155,16 +156,31 @@ def _left_out(objects, found, carried, context):
     """What is there and not among the points, or what they carry, of names that are `found` on some of them; a line on
     each kind."""
     for obj in objects:
-        if count := _instances_with_points(_geometry(obj, context)):
+        geometry = _geometry(obj, context)
+        if count := _instances_with_points(geometry):
             yield (
                 f"{obj.name}: {count:,} instances count as a point each; for the points within them add Realize "
                 "Instances at the end of its geometry nodes"
+            )
+        if _has_large_faces(geometry.mesh):
+            yield (
+                f"{obj.name}: its vertices alone are read, and most of its area lies on faces far larger than these "
+                "are apart: for points all over it use Distribute Points on Faces in geometry nodes"
             )
     names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
     names += [*found, *(group.name for obj in objects for group in obj.vertex_groups)]
     if lost := sorted(set(names) - set(carried)):
         kinds = "only numbers and colors of points are, of one type wherever they are, no vertex groups"
         yield f"Not carried over: {', '.join(lost)}; {kinds}"
+
+
+def _has_large_faces(mesh):
+    """Whether the faces of a mesh, None where there is none, are much larger than its vertices are close together: of
+    a cylinder of 128 sides the mean face, by area, is 15 times the area for each vertex, of scans some 1 to 3 times."""
+    if mesh is None or not len(mesh.polygons):
+        return False
+    area = _values(mesh.polygons, "area", np.float32).astype(np.float64)
+    return len(mesh.vertices) * (area**2).sum() > _LARGE * area.sum() ** 2
 
 
 def _instances_with_points(geometry):

@@ -445,3 +445,22 @@ def test_fixed_axes_follow_the_object_as_normals_do(gather, add_mesh, sphere):
     assert indices.tolist() == [7, 20]
     unit = world_axes / np.linalg.norm(world_axes, axis=1, keepdims=True)
     assert_allclose(unit, [np.array([4, 1, 0]) / 17**0.5, (0, 0, 1)], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (dict(kind="cylinder", vertices=128), True),
+        (dict(kind="monkey"), False),
+        (dict(kind="torus"), False),
+        (dict(kind="cube"), False),
+    ],
+    ids=lambda make: make["kind"] if isinstance(make, dict) else "",
+)
+def test_of_parts_with_large_faces_it_is_told_that_vertices_alone_are_read(blender, extension, make, told):
+    options = dict(make)
+    getattr(blender.ops.mesh, f"primitive_{options.pop('kind')}_add")(**options)
+    obj = blender.context.object
+    found = extension("vad_addon.points_in").gather([obj], blender.context)
+    assert any("its vertices alone are read" in line for line in found.warnings) == told
+    assert len(found.points) == len(obj.data.vertices)
