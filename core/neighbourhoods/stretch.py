@@ -38,8 +38,8 @@ class Stretch:
 
     @classmethod
     def of(cls, points: np.ndarray, tree: KDTree, step: np.ndarray, lines: Lines, next_line: np.ndarray, progress=None):
-        """Of samples (n,3), those of the tree, from the `lines` that some of them are on, how far the next line is from
-        these, (n,), zero where there is none, and the distances `step` (n,) to the next sample along them."""
+        """Of samples (n,3), those of the tree, from the `lines` that some of them are on, how far the `next_line` is
+        from these, (n,), zero where there is none, and the distances `step` (n,) to the next sample along them."""
         n, on, progress = len(points), lines.number >= 0, Progress.of(progress)
         beside, own = np.zeros(n, bool), np.flatnonzero(on)
         for part in progress.part(0.0, 0.5).chunks(len(own), _CHUNK):
@@ -51,13 +51,12 @@ class Stretch:
             row = asked[part]
             distance, other = k_nearest(tree, points[row], _AROUND, workers=-1)
             apart, usual = (medians(of_each[other]) for of_each in known)
-            own = step[row]
-            rest = ~on[row]
-            along[row[rest]], own[rest] = _line_through(points, row[rest], distance[rest], other[rest])
-            found = (own <= _FAR * usual) & (apart > own)
+            ahead, rest = step[row], ~on[row]
+            along[row[rest]], ahead[rest] = _line_through(points, row[rest], distance[rest], other[rest])
+            found = (ahead <= _FAR * usual) & (apart > ahead)
             along[row[~found]] = 0.0
             across[row[found]] = apart[found]
-            ratio[row[found]] = np.minimum(apart[found] / own[found], _MOST)
+            ratio[row[found]] = np.minimum(apart[found] / ahead[found], _MOST)
         return cls(along, across, ratio)
 
     def aside(self, row: np.ndarray, direction: np.ndarray) -> np.ndarray:

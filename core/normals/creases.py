@@ -73,7 +73,8 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
 
 
 def agreed_share(mirrors, normals, held):
-    """The share of the neighbours that each axis agrees with, (n,), and which are to be looked at, (n,) bool."""
+    """The share of the neighbours that each axis agrees with, on lines of those to the side, (n,), and which are to be
+    looked at, (n,) bool."""
     agreed, rise = mirrors.means_aside(_alike(mirrors.cosines(normals)), np.abs(mirrors.rises(normals)))
     return agreed, (agreed < _AGREED) & (rise > _STEEP) & ~held
 

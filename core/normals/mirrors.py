@@ -110,7 +110,7 @@ class Mirrors:
         return np.clip(self.gather @ self.cosines(normals) ** 2, 0.0, 1.0)
 
     def means_aside(self, *values: np.ndarray) -> list[np.ndarray]:
-        """Means (n,) of values (p,) over the neighbours of each sample, those ahead and behind on its line left out."""
+        """Means (n,) of values (p,) over the neighbours of each sample, on lines by how far to the side these are."""
         if self.stretch is None:
             return [self.gather @ each for each in values]
         weight, count = self.weight * self.stretch.aside(self.site, self.direction.T), self.gather.shape[0]
