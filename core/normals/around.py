@@ -1,7 +1,6 @@
 """The neighbours that may lie on the sheet of a sample, wherever its Voronoi neighbours are."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -18,7 +17,7 @@ _LEAST = 1e-9  # weight of what lies in a plane
 _SEVERAL = 0.2  # deviation of what lies in one plane from one line in it, distances to the next line
 
 
-@dataclass(frozen=True)
+@dataclass
 class Around:
     """points  : (n,3) float64, distinct samples     spacing : (n,) float64, local spacing, same units
     stretch : how they lie closer along lines, None where there are none"""
@@ -27,9 +26,8 @@ class Around:
     spacing: np.ndarray
     stretch: Stretch | None = None
 
-    @cached_property
-    def tree(self):
-        return KDTree(self.points)
+    def __post_init__(self):
+        self.tree = KDTree(self.points)
 
     def parts(self, row):
         """A list of parts of samples `row` (r,), of at most 256 that are all on lines, or all on none."""

@@ -11,6 +11,7 @@ from ..progress import Progress
 from ..voronoi.facets import CLIP_RADIUS, Facets
 
 _CLOSEST = 0.25  # local spacings
+_AHEAD = 1e-6  # share of the weight of neighbours straight ahead on a line: where all are, they count alike
 _LEFT = 0.15  # least share of a sample's neighbours, by weight, that it can do with
 
 
@@ -113,7 +114,8 @@ class Mirrors:
         """Means (n,) of values (p,) over the neighbours of each sample, on lines by how far to the side these are."""
         if self.stretch is None:
             return [self.gather @ each for each in values]
-        weight, count = self.weight * self.stretch.aside(self.site, self.direction.T), self.gather.shape[0]
+        aside, count = np.maximum(self.stretch.aside(self.site, self.direction.T), _AHEAD), self.gather.shape[0]
+        weight = self.weight * aside
         total = np.bincount(self.site, weights=weight, minlength=count)
         weight = weight / np.where(total > 0, total, 1.0)[self.site]
         return [np.bincount(self.site, weights=weight * each, minlength=count) for each in values]

@@ -464,3 +464,16 @@ def test_of_parts_with_large_faces_it_is_told_that_vertices_alone_are_read(blend
     found = extension("vad_addon.points_in").gather([obj], blender.context)
     assert any("its vertices alone are read" in line for line in found.warnings) == told
     assert len(found.points) == len(obj.data.vertices)
+
+
+@pytest.mark.parametrize("loose", [False, True], ids=["a base", "loose points"])
+def test_a_scan_with_a_large_face_is_one(add_mesh, blender, extension, loose):
+    x, y = np.divmod(np.arange(2500), 50)
+    corner = (x * 50 + y)[(x < 49) & (y < 49)]
+    faces = [] if loose else np.stack([corner, corner + 50, corner + 51, corner + 1], axis=1).tolist()
+    obj = add_mesh("Scan", np.zeros((1, 3)))
+    mesh = blender.data.meshes.new("Scan")
+    points = [*np.stack([x, y, 0 * x], axis=1).tolist(), (0, 0, -9), (20, 0, -9), (20, 20, -9), (0, 20, -9)]
+    mesh.from_pydata(points, [], [*faces, (2500, 2501, 2502, 2503)])
+    obj.data = mesh
+    assert extension("vad_addon.points_in").gather([obj], blender.context).warnings == ()
