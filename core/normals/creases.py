@@ -58,15 +58,15 @@ def normals_of_sheets(points, spacing, mirrors: Mirrors, normals, fixed=(), prog
         for part in (progress.part(0.0, 0.5), progress.part(0.5, 1.0)):
             leaning = (mirrors.confidence(normals) < _UPRIGHT) & apart
             suspect = agreed_share(here, normals, fixed)[1]
-            normals, flat = onto_planes(around, normals, suspect, leaning)
-            normals, bent = _onto_sheets(around, here, normals, held, agreed, part)
+            normals, flat = onto_planes(around, normals, suspect, leaning, part.part(0.0, 0.3))
+            normals, bent = _onto_sheets(around, here, normals, held, agreed, part.part(0.3, 0.7))
             if not (flat | bent).any():
                 break
             moved = moved | flat | bent
             beside = mirrors.and_around(moved)
             swept = mirrors.and_around(beside) & ~held
             normals = sweeps_over(_parted(mirrors.at(swept), normals, beside), normals, swept, _SWEEPS)
-            normals, shared = onto_shared_planes(around, mirrors, normals, ~fixed)
+            normals, shared = onto_shared_planes(around, mirrors, normals, ~fixed, part.part(0.7, 1.0))
             held, moved = held | shared, moved | shared
     parted = _parted(mirrors, normals, mirrors.and_around(moved)) if moved.any() else mirrors
     return normals, parted.confidence(normals), moved

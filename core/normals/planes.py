@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from ..parallel import in_order
+from ..progress import Progress
 from .around import Around
 
 _NEAREST = 8  # pairs of these and the sample make the planes that are tried
@@ -25,17 +26,17 @@ _FEWEST, _FEWEST_ON_LINES = 6.0, 12.0  # neighbours that must lie in it
 _ALIKE = 0.2  # their mean squared cosine with its axis, at least: lines on a wavy sheet lie in planes as well
 
 
-def onto_planes(around: Around, normals, suspect, leaning):
+def onto_planes(around: Around, normals, suspect, leaning, progress=None):
     """The axes (n,3) after those of samples `suspect` (n,) bool are taken to the plane in which most of their
     neighbours lie, where there are enough, and those of others `leaning` (n,) bool where these lie in it more exactly;
     and which these are, (n,) bool.
 
     around : of all samples     normals : (n,3) unit axes
     """
-    turned, moved = normals.copy(), np.zeros(len(normals), bool)
+    progress, turned, moved = Progress.of(progress), normals.copy(), np.zeros(len(normals), bool)
     for chosen, inside in ((suspect, _INSIDE), (leaning & ~suspect, _EXACTLY)):
         look = partial(_fullest, around=around, normals=normals, within=inside)
-        for row, (axes, founded) in in_order(look, around.parts(np.flatnonzero(chosen))):
+        for row, (axes, founded) in in_order(look, progress.each(around.parts(np.flatnonzero(chosen)))):
             turned[row[founded]], moved[row[founded]] = axes[founded], True
     return turned, moved
 

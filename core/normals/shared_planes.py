@@ -12,6 +12,7 @@ import numpy as np
 from ..linalg import dots, row_dots, unit
 from ..lookup import mask_of
 from ..parallel import in_order
+from ..progress import Progress
 from .around import Around
 from .mirrors import Mirrors
 
@@ -23,17 +24,18 @@ _WEDGE = 0.2  # least sine of the angle between two of them: all of a straight l
 _ROUNDS = 4  # for those that share the planes of others once these are right
 
 
-def onto_shared_planes(around: Around, mirrors: Mirrors, normals, free):
+def onto_shared_planes(around: Around, mirrors: Mirrors, normals, free, progress=None):
     """The axes (n,3) after those of samples are taken to the plane that most of their neighbours share with them, and
     which these are, (n,) bool.
 
     around, mirrors : of all samples     free : (n,) bool, samples whose axes may change
     """
-    moved = np.zeros(len(normals), bool)
+    progress, moved = Progress.of(progress), np.zeros(len(normals), bool)
     for _ in range(_ROUNDS):
         turned, changed = normals.copy(), np.zeros(len(normals), bool)
         look = partial(_most_shared, around=around, normals=normals)
-        for _, (row, axes) in in_order(look, around.parts(np.flatnonzero(free & _offered(mirrors, normals)))):
+        parts = around.parts(np.flatnonzero(free & _offered(mirrors, normals)))
+        for _, (row, axes) in in_order(look, progress.each(parts)):
             turned[row], changed[row] = axes, True
         if not changed.any():
             break
