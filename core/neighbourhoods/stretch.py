@@ -1,8 +1,7 @@
 """How much closer samples lie along the lines that they are on than the lines lie to each other.
 
-That holds for samples beside them as well: of the last line before a crease the nearest are partly those of another
-sheet, and it does not look like a line. Of all that is around, samples of the own line are most, and nearest, and say
-nothing of how the surface is turned about it.
+The last line before a crease has samples of the other sheet among its nearest, so that it is not recognised as one by
+these alone. Most of the samples around are of the same line, and say nothing of how the surface is turned about it.
 """
 
 from dataclasses import dataclass
@@ -16,11 +15,11 @@ from ..progress import Progress
 from ..trees import k_nearest
 from .lines import Lines
 
-_BESIDE = 20  # of a sample on a line, that may be on one that does not look it
+_BESIDE = 20  # nearest of a sample on a line, which may be on lines that are not recognised
 _AROUND = 64  # whose median tells how far apart lines are, and samples along them
 _TRIED = 8  # nearest, two of which are those before and behind on the line
 _STRAIGHT = 0.98  # least cosine between the ways there
-_FAR = 1.6  # times as far as on the lines around, at most, are these
+_FAR = 1.6  # times as far as usual on the lines around, at most, those two are away
 _MOST = 8.0  # times as far away as samples along it, is the next line taken to be at most
 _ASKED = 257  # nearest, among which those that are nearest by the stretch are found, and the sample
 _CHUNK = 16384  # samples
@@ -28,7 +27,7 @@ _CHUNK = 16384  # samples
 
 @dataclass(frozen=True)
 class Stretch:
-    """along  : (n,3) float64, unit direction of the line that each sample is on, zero where it is on none
+    """along  : (n,3) float64, unit direction of the line that each sample is on, zero on none or without a next
     across : (n,) float64, how far away the next line is, units of the points, zero there
     ratio  : (n,) float64, 1 to 8, of that to the distance to the next sample along the line, 1 there"""
 
@@ -59,9 +58,9 @@ class Stretch:
             ratio[row[found]] = np.minimum(apart[found] / ahead[found], _MOST)
         return cls(along, across, ratio)
 
-    def aside(self, row: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """The squared sine between the lines of samples `row` (m,) and unit directions (m,3), (m,): how much a
-        neighbour there tells of how the surface is turned about the line. 1 for samples on none."""
+    def squared_sine(self, row: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """That between the lines of samples `row` (...) and unit directions (...,3), (...): how much a neighbour there
+        tells of how the surface is turned about the line. 1 for samples on none."""
         return 1 - row_dots(self.along[row], direction) ** 2
 
     def nearest(self, row: np.ndarray, points: np.ndarray, tree: KDTree, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from ..linalg import row_dots
 from ..neighbourhoods.stretch import Stretch
 from ..points import SPACING_NEIGHBOURS
 
@@ -57,22 +56,19 @@ class Around:
             return np.ones(axes.shape[:2], bool)
         along = self.stretch.along[row, None]
         step = self.points[other] - self.points[row, None]
-        weight = weight * (1 - self._along(row, direction)[:, None] ** 2)
+        weight = weight * self.stretch.squared_sine(row[:, None], direction)[:, None]
         total = np.maximum(weight.sum(axis=2), _LEAST)
-        aside = np.cross(along, axes) @ step.transpose(0, 2, 1)
-        mean = (weight * aside).sum(axis=2) / total
-        deviation = (weight * (aside - mean[..., None]) ** 2).sum(axis=2) / total
-        return deviation > (_SEVERAL * self.stretch.across[row, None]) ** 2
+        offset = np.cross(along, axes) @ step.transpose(0, 2, 1)
+        mean = (weight * offset).sum(axis=2) / total
+        variance = (weight * (offset - mean[..., None]) ** 2).sum(axis=2) / total
+        return variance > (_SEVERAL * self.stretch.across[row, None]) ** 2
 
     def aside(self, row, direction):
         """Whether unit directions (r,k,3) from samples `row` (r,) of a part lead to the side of their lines, (r,k)
         bool; true where these are on none."""
         if not self.are_on_lines(row):
             return np.ones(direction.shape[:2], bool)
-        return self._along(row, direction) ** 2 < 1 - _ASIDE**2
-
-    def _along(self, row, direction):
-        return row_dots(direction, self.stretch.along[row, None])
+        return self.stretch.squared_sine(row[:, None], direction) > _ASIDE**2
 
     def are_on_lines(self, row):
         """Whether the samples `row` of a part are."""

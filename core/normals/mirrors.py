@@ -114,7 +114,7 @@ class Mirrors:
         """Means (n,) of values (p,) over the neighbours of each sample, on lines by how far to the side these are."""
         if self.stretch is None:
             return [self.gather @ each for each in values]
-        aside, count = np.maximum(self.stretch.aside(self.site, self.direction.T), _AHEAD), self.gather.shape[0]
+        aside, count = np.maximum(self.stretch.squared_sine(self.site, self.direction.T), _AHEAD), self.gather.shape[0]
         weight = self.weight * aside
         total = np.bincount(self.site, weights=weight, minlength=count)
         weight = weight / np.where(total > 0, total, 1.0)[self.site]

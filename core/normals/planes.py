@@ -5,8 +5,8 @@ and those next to it that lean on these. Of the samples on the edges of a cube's
 plane that halves the solid along the edge. Where the sheets are flat, the places tell: many of the neighbours lie in
 one plane with the sample, to within rounding, which chance does not do.
 
-Lines that a surface was cut by lie in planes, too, those of the cuts, and any two lines side by side in another. In the
-former the axes of all neighbours are at right angles to that of the plane; in the latter there is no third line.
+Lines along which a surface was cut lie in the planes of the cuts, too, and any two neighbouring lines in a common one.
+In the first the axes of all neighbours are at right angles to that of the plane; in the second there is no third line.
 """
 
 from functools import partial
