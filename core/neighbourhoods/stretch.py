@@ -21,7 +21,6 @@ _TRIED = 8  # nearest, two of which are those before and behind on the line
 _STRAIGHT = 0.98  # least cosine between the ways there
 _FAR = 1.6  # times as far as usual on the lines around, at most, those two are away
 _MOST = 8.0  # times as far away as samples along it, is the next line taken to be at most
-_ASKED = 257  # nearest, among which those that are nearest by the stretch are found, and the sample
 _CHUNK = 16384  # samples
 
 
@@ -65,8 +64,10 @@ class Stretch:
 
     def nearest(self, row: np.ndarray, points: np.ndarray, tree: KDTree, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Distances (r,k) from samples `row` (r,) to the `count` nearest others, shortened to the side of the line by
-        the ratio, and their rows, (r,k), as among samples equally far apart each way; nearest first."""
-        distance, other = k_nearest(tree, points[row], _ASKED)
+        the ratio, and their rows, (r,k), as among samples equally far apart each way; nearest first. They
+        are looked for among so many of the nearest as hold them where lines go on to all sides."""
+        asked = int(np.ceil(count * self.ratio[row].max())) + 1
+        distance, other = k_nearest(tree, points[row], asked)
         distance, other = distance[:, 1:], other[:, 1:]
         ahead = row_dots(points[other] - points[row, None], self.along[row, None]) ** 2
         shortened = ahead + np.maximum(distance**2 - ahead, 0.0) / self.ratio[row, None] ** 2

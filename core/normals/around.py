@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from ..linalg import row_dots
 from ..neighbourhoods.stretch import Stretch
 from ..points import SPACING_NEIGHBOURS
 
@@ -29,9 +30,11 @@ class Around:
         self.tree = KDTree(self.points)
 
     def parts(self, row):
-        """A list of parts of samples `row` (r,), of at most 256 that are all on lines, or all on none."""
-        lines = np.zeros(len(row), bool) if self.stretch is None else self.stretch.ratio[row] > 1
-        alike = (row[~lines], row[lines])
+        """A list of parts of samples `row` (r,), of at most 256 that are all on none, or all on lines, stretched about
+        as much."""
+        ratio = np.ones(len(row)) if self.stretch is None else self.stretch.ratio[row]
+        order = np.argsort(ratio, kind="stable")
+        alike = np.split(row[order], [np.count_nonzero(ratio == 1)])
         return [some[first : first + _CHUNK] for some in alike for first in range(0, len(some), _CHUNK)]
 
     def neighbours(self, row):
@@ -48,20 +51,20 @@ class Around:
         near = np.exp(-((distance / (_WIDTH * spacing[:, None])) ** 2))
         return other, step / np.linalg.norm(step, axis=2)[..., None], near
 
-    def tell(self, row, other, direction, axes, weight):
-        """Whether what lies in planes with unit axes (r,t,3) through samples `row` (r,) of a part tells that these are
-        planes of the surface, (r,t) bool: any two lines lie in one, so that on lines there have to be more. In a plane
-        lie the neighbours `other` (r,k), in unit directions (r,k,3), by weights (r,t,k)."""
-        if not self.are_on_lines(row):
-            return np.ones(axes.shape[:2], bool)
-        along = self.stretch.along[row, None]
+    def are_founded(self, row, other, axes, weight):
+        """Whether planes through samples `row` (p,) of a part, with unit axes (p,3), are those of the surface for all
+        that lies in them, (p,) bool: any two lines lie in one, so that on lines there have to be more. In each plane
+        lie the neighbours `other` (p,k), by weights (p,k)."""
+        if not len(row) or not self.are_on_lines(row):
+            return np.ones(len(row), bool)
         step = self.points[other] - self.points[row, None]
-        weight = weight * self.stretch.squared_sine(row[:, None], direction)[:, None]
-        total = np.maximum(weight.sum(axis=2), _LEAST)
-        offset = np.cross(along, axes) @ step.transpose(0, 2, 1)
-        mean = (weight * offset).sum(axis=2) / total
-        variance = (weight * (offset - mean[..., None]) ** 2).sum(axis=2) / total
-        return variance > (_SEVERAL * self.stretch.across[row, None]) ** 2
+        direction = step / np.linalg.norm(step, axis=2)[..., None]
+        weight = weight * self.stretch.squared_sine(row[:, None], direction)
+        total = np.maximum(weight.sum(axis=1), _LEAST)
+        offset = row_dots(step, np.cross(self.stretch.along[row], axes)[:, None])
+        mean = row_dots(weight, offset) / total
+        variance = row_dots(weight, (offset - mean[:, None]) ** 2) / total
+        return variance > (_SEVERAL * self.stretch.across[row]) ** 2
 
     def aside(self, row, direction):
         """Whether unit directions (r,k,3) from samples `row` (r,) of a part lead to the side of their lines, (r,k)

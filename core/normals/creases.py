@@ -30,6 +30,7 @@ from .shared_planes import onto_shared_planes
 _ALIKE = 0.06  # of the Gaussian of the sine between axes of one sheet
 _AGREED = 0.6  # share of its neighbours that speak for the axis of a sample on a smooth sheet
 _GAIN = 0.1  # by which that share must rise
+_TRIED = 32  # nearest whose images may be the axis
 _FEWEST = 4.0  # neighbours that must speak for the new axis
 _STEEP, _FLAT = 0.12, 0.05  # mean sines at which neighbours rise out of the plane of the old axis, and of the new one
 _UPRIGHT = 0.97  # confidence, below which axes may lean on those of another sheet
@@ -118,7 +119,7 @@ def _densest(row, around, normals, agreed):
     images -= 2 * row_dots(images, direction)[..., None] * direction
     weight = near * np.maximum(agreed[other], np.finfo(float).tiny)
 
-    tried = np.concatenate([normals[row, None], images], axis=1)
+    tried = np.concatenate([normals[row, None], images[:, :_TRIED]], axis=1)
     cosine = np.einsum("rti,rki->rtk", tried, images)
     alike = _alike(cosine)
     share = np.einsum("rtk,rk->rt", alike, weight) / weight.sum(axis=1)[:, None]

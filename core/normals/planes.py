@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from ..linalg import row_dots
 from ..parallel import in_order
 from ..progress import Progress
 from .around import Around
@@ -52,11 +53,15 @@ def _fullest(row, around, normals, within):
     sine = np.linalg.norm(axes, axis=2)
     axes = np.concatenate([normals[row, None], axes / np.maximum(sine, _WEDGE)[..., None]], axis=1)
     inside = np.exp(-0.5 * (axes @ direction.transpose(0, 2, 1) / within) ** 2)
-    share = np.einsum("rtk,rk->rt", inside, near)
+    share = (inside @ near[..., None])[..., 0]
     share[:, 1:][sine < _WEDGE] = 0
-    weight = inside * near[:, None]
-    alike = np.einsum("rtk,rtk->rt", weight, (axes @ normals[other].transpose(0, 2, 1)) ** 2)
-    share *= around.tell(row, other, direction, axes, weight) & (alike >= _ALIKE * weight.sum(axis=2))
+    full = share > _SHARE
+    full[:, 0] = full.any(axis=1)
+    of, plane = np.nonzero(full)
+    weight = inside[of, plane] * near[of]
+    alike = row_dots(weight, row_dots(axes[of, plane][:, None], normals[other[of]]) ** 2)
+    founded = (alike >= _ALIKE * share[of, plane]) & around.are_founded(row[of], other[of], axes[of, plane], weight)
+    share[of[~founded], plane[~founded]] = 0
 
     every, best = np.arange(len(row)), share.argmax(axis=1)
     most = share[every, best]

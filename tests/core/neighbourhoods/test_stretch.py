@@ -15,11 +15,11 @@ def stretch_of(points):
     return across_lines(points, local_spacing(points))[1]
 
 
-def rows(count=12):
+def rows(count=12, between=BETWEEN, places=60):
     """Samples (n,3) in rows, the numbers of these (n,), and of the places along them, (n,)."""
-    number, place = (x.reshape(-1) for x in np.meshgrid(np.arange(count), np.arange(60), indexing="ij"))
+    number, place = (x.reshape(-1) for x in np.meshgrid(np.arange(count), np.arange(places), indexing="ij"))
     shift = np.random.default_rng(1).random(count)[number]
-    return np.stack([STEP * (place + shift), BETWEEN * number, 0.0 * place], axis=1), number, place
+    return np.stack([STEP * (place + shift), between * number, 0.0 * place], axis=1), number, place
 
 
 def test_rows_have_their_direction_and_their_ratio():
@@ -49,12 +49,23 @@ def test_the_nearest_by_the_stretch_are_as_many_to_the_side_as_along():
     points, number, place = rows()
     own = np.flatnonzero((number == 6) & (place == 30))
     distance, other = stretch_of(points).nearest(own, points, KDTree(points), 24)
-    assert (np.diff(distance) >= 0).all()
     assert own[0] not in other
     along, across = np.abs(points[other[0]] - points[own[0]]).T[:2]
     np.testing.assert_allclose(distance[0], np.hypot(along, across * STEP / BETWEEN), rtol=0.02)
     assert across.max() == pytest.approx(2 * BETWEEN)
     assert along.max() < 3.5 * STEP
+
+
+@pytest.mark.parametrize("ratio", [4, 7])
+def test_they_are_those_that_are_nearest_once_all_is_shortened_to_the_side(ratio):
+    points, number, place = rows(16, ratio * STEP, 120)
+    own = np.flatnonzero((number == 8) & (place == 60))
+    found = stretch_of(points)
+    distance, other = found.nearest(own, points, KDTree(points), 64)
+    shortened = points / [1, found.ratio[own[0]], 1]
+    expected, nearest = KDTree(shortened).query(shortened[own], k=65)
+    assert set(other[0]) == set(nearest[0, 1:])
+    np.testing.assert_allclose(distance, expected[:, 1:], rtol=1e-6)
 
 
 @pytest.mark.parametrize("points", [shapes.scattered_sphere(2000), shapes.torus(1500), shapes.square(900)])
