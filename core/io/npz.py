@@ -10,6 +10,7 @@ from ..field.distance_field import BandedField
 from ..linalg import unit
 from ..reconstruction import Reconstruction
 from .atomic import atomic_path
+from .endings import ending_in
 
 
 def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
@@ -31,7 +32,8 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
     values    : (k,8,8,8) float32                                           band  : float64, its half width
     gradient  : (k,8,8,8,3) float32, zero within a cell of the band's end
 
-    Raises :class:`VADError` where the file cannot be written whole.
+    Raises :class:`InputError` for paths that do not end in .npz, :class:`VADError` where the file cannot be written
+    whole.
     """
     field, near = result.field, result.field.near
     node = np.stack(np.unravel_index(near.node, field.shape), axis=1)
@@ -50,6 +52,7 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
         direction=unit(near.step).astype(np.float32),
         foot=field.origin + field.spacing * node - near.step,
     )
+    path = ending_in(".npz", path)
     with atomic_path(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
         for name, array in arrays.items():  # numpy.savez would leave the archive open where the disk is full
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:

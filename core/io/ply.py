@@ -11,8 +11,10 @@ import numpy as np
 from plyfile import PlyData, PlyElement
 
 from ..errors import InputError
+from ..given_arrays import points_array, real_numbers
 from ..surface.mesh import Mesh
 from .atomic import atomic_path
+from .endings import ending_in
 from .own_files import MADE_BY
 
 _NAME = re.compile(r"[!-~]+")
@@ -26,7 +28,8 @@ def write_mesh(path: str | os.PathLike, mesh: Mesh, attributes: dict[str, np.nda
     attributes : further properties of the vertices by name, (v,) each; written in their own type, or, if PLY has none
                  that long, as int32 where they fit and else as double
 
-    Raises :class:`InputError` for attributes that are not (v,) numbers, or whose names PLY cannot hold or are taken.
+    Raises :class:`InputError` for attributes that are not (v,) numbers, or whose names PLY cannot hold or are taken,
+    and for paths that do not end in .ply.
     """
     vertices = _records(_triple("xyz", mesh.vertices), attributes)
     _write(path, PlyElement.describe(vertices, "vertex"), _faces([mesh.quads, mesh.triangles]))
@@ -37,11 +40,14 @@ def write_points(
 ) -> None:
     """Write `points` (n,3) with their `normals` (n,3) as `path`.
 
-    Properties: double x, y, z in input units; float nx, ny, nz (unit axes); and `attributes`, with the errors they
-    raise, as in :func:`write_mesh`.
+    Properties: double x, y, z in input units; float nx, ny, nz (unit axes); and `attributes`. Raises
+    :class:`InputError` as :func:`write_mesh` does, and where points and normals are not (n,3) numbers.
     """
-    axes = _triple(("nx", "ny", "nz"), np.asarray(normals, np.float32))
-    records = _records(_triple("xyz", points) | axes, attributes)
+    points, axes = points_array(points), real_numbers(normals, "normals", "an (n,3) array")
+    if axes.shape != points.shape:
+        raise InputError(f"normals have shape {axes.shape} and points {points.shape}; give one for each")
+    records = _triple("xyz", points) | _triple(("nx", "ny", "nz"), axes.astype(np.float32))
+    records = _records(records, attributes)
     _write(path, PlyElement.describe(records, "vertex"))
 
 
@@ -95,5 +101,5 @@ def _column(name, values, count, taken):
 
 
 def _write(path, *elements):
-    with atomic_path(path) as temporary:
+    with atomic_path(ending_in(".ply", path)) as temporary:
         PlyData(elements, byte_order="<", comments=[MADE_BY]).write(str(temporary))

@@ -9,6 +9,7 @@ from ..errors import InputError, VADError
 from ..field.blocks import each, node_gradient
 from ..field.distance_field import BandedField, DistanceField
 from .atomic import ELSEWHERE, atomic_path
+from .endings import ending_in
 from .openvdb_module import fill, load_openvdb
 from .own_files import MADE_BY
 
@@ -28,10 +29,11 @@ def write_vdb(
     gradient : (only if asked) vectors along which the distance grows, unit-free, by central differences; within a band
                zero for its last cell
 
-    Raises :class:`MissingDependency` without OpenVDB, :class:`InputError` for cells smaller than it takes and for paths
-    that are no text, :class:`VADError` where the file cannot be written whole, which says what to do `otherwise`.
+    Raises :class:`MissingDependency` without OpenVDB, :class:`InputError` for cells smaller than it takes, for paths
+    that are no text or do not end in .vdb, :class:`VADError` where the file cannot be written whole, which says what to
+    do `otherwise`.
     """
-    openvdb = load_openvdb()
+    openvdb, path = load_openvdb(), ending_in(".vdb", path)
     try:
         os.fspath(path).encode()
     except UnicodeEncodeError as error:

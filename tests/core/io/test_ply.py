@@ -130,6 +130,18 @@ def test_attributes_that_ply_cannot_hold_are_refused(folder, name, values, said)
     assert not (folder / "n.ply").exists()
 
 
+@pytest.mark.parametrize("points", [np.zeros((3, 2)), "abc", [[0, 0, 1j]]])
+def test_points_that_are_none_are_refused(tmp_path, points):
+    with pytest.raises(InputError, match="points"):
+        write_points(tmp_path / "p.ply", points, np.zeros((3, 3)))
+    assert os.listdir(tmp_path) == []
+
+
+def test_so_are_normals_of_others(tmp_path):
+    with pytest.raises(InputError, match=r"normals have shape \(2, 3\) and points \(3, 3\)"):
+        write_points(tmp_path / "p.ply", np.zeros((3, 3)), np.zeros((2, 3)))
+
+
 def test_a_failed_write_leaves_nothing(tmp_path):
     with pytest.raises(VADError, match="cannot be written"):
         write_mesh(tmp_path / "missing" / "mesh.ply", FAR_TETRAHEDRON)
