@@ -9,7 +9,13 @@ from core.points import local_spacing
 from tests import shapes
 from tests.core.normals.test_creases import degrees
 
-DIRECTIONS = {"across an edge": (1, 0, 0), "along one": (1, 1, 0), "of a corner": (1, 1, 1), "any": (1, 0.5, 0.23)}
+SIZE = (1.0, 0.8, 0.6)
+DIRECTIONS = {  # and the share of axes beside edges that may be off
+    "across an edge": ((1, 0, 0), 0.01),
+    "along one": ((1, 1, 0), 0.08),
+    "of a corner": ((1, 1, 1), 0.1),
+    "any": ((1, 0.5, 0.23), 0.14),
+}
 
 
 def axes_of(points):
@@ -18,15 +24,16 @@ def axes_of(points):
 
 
 @pytest.mark.parametrize("ratio", [2, 4, 6])
-@pytest.mark.parametrize("direction", DIRECTIONS.values(), ids=DIRECTIONS)
-def test_axes_beside_the_edges_of_a_box_are_those_of_its_faces(direction, ratio):
+@pytest.mark.parametrize(("direction", "share"), DIRECTIONS.values(), ids=DIRECTIONS)
+def test_axes_beside_the_edges_of_a_box_are_those_of_its_faces(direction, share, ratio):
     """Half to all of the last lines before edges were off by more than 5 degrees at four times, by up to 45 of them."""
     step = 0.035 / np.sqrt(ratio)
-    points, normals = shapes.cut_box(direction, step, ratio * step)
-    beside = np.sort(np.minimum(points, np.subtract((1.0, 0.8, 0.6), points)), axis=1)[:, 1] < ratio * step
+    points, normals = shapes.cut_box(direction, step, ratio * step, SIZE)
+    to_faces = np.minimum(points, np.subtract(SIZE, points))[:, normals.any(axis=0)]
+    beside = np.sort(to_faces, axis=1)[:, 1] < ratio * step
     off = degrees(axes_of(points), normals)
     assert (off[~beside] > 5).mean() < 0.02
-    assert (off[beside] > 5).mean() < 0.14
+    assert (off[beside] > 5).mean() < share
     assert np.median(off[beside]) < 1
 
 
