@@ -1,6 +1,7 @@
 """The command line: `python -m core reconstruct SCAN -o OUT` and `python -m core info SCAN`."""
 
 import argparse
+import shlex
 import signal
 import sys
 import threading
@@ -33,6 +34,7 @@ from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
 
 PROGRAM = "python -m core"
+_NO = "false", "no", "off", "0"
 _MESHES = {kind: f"_{kind}.ply" for kind in ("double", "single", "signed")}
 _POINTS, _VOLUME, _ARRAYS, _REPORT = "_points.ply", ".vdb", ".npz", ".json"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
@@ -139,11 +141,19 @@ class _Parser(argparse.ArgumentParser):
 
 def _parsed(arguments):
     """What was given. Raises :class:`SettingsError` for what no option takes, with the option that may be meant."""
+    if arguments and Path(arguments[0]).suffix.lower() in READERS:
+        scan = shlex.quote(arguments[0])
+        raise SettingsError(
+            f"no command before {scan}; its surface: {PROGRAM} reconstruct {scan} -o FOLDER; what it holds: {PROGRAM} "
+            f"info {scan}"
+        )
     given, unknown = _parser().parse_known_args(arguments)
     if unknown:
         name = unknown[0].partition("=")[0]
         begun = list({option.replace("_", "-") for option in given.spelt if option.startswith(name)})
         meant = begun if len(begun) == 1 else get_close_matches(name, given.spelt, 1, 0.75)
+        opposite = arguments[arguments.index(unknown[0]) - 1].replace("--", "--no-", 1)
+        meant = [opposite] if unknown[0].lower() in _NO and opposite in given.spelt else meant
         raise SettingsError(
             f"unrecognized: {' '.join(unknown)}{f' (is {meant[0]} meant?)' if meant else ''}; {given.command} takes "
             f"one scan at a time, and the options of {PROGRAM} {given.command} --help"

@@ -359,6 +359,13 @@ def test_a_run_that_fails_while_it_writes_changes_nothing(capsys, scan, calls, t
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
+def test_a_scan_without_a_command_is_told_the_two(capsys, scan):
+    message = refused(capsys, scan, "--resolution", "64")
+    assert f"python -m core reconstruct {scan} -o FOLDER" in message
+    assert f"python -m core info {scan}" in message
+    assert "'my scan.ply'" in refused(capsys, "my scan.ply")
+
+
 def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan, calls):
     message = refused(capsys, "reconstruct", scan, "-o", "out", "--resolutoin", "32")
     assert "--resolutoin 32 (is --resolution meant?)" in message
@@ -366,6 +373,10 @@ def test_what_no_option_takes_is_told_with_the_help_that_lists_them(capsys, scan
     for given in ("--no-outlier", "--outlier", "--memory-limt=640"):
         meant = {"--memory-limt=640": "--memory-limit"}.get(given, f"{given}s")
         assert f"{given} (is {meant} meant?)" in refused(capsys, "reconstruct", scan, "-o", "out", given)
+    for no in ("False", "no", "0"):
+        message = refused(capsys, "reconstruct", scan, "-o", "out", "--outliers", no)
+        assert f"{no} (is --no-outliers meant?)" in message
+    assert "meant" not in refused(capsys, "reconstruct", scan, "-o", "out", "--outliers", "True")
     for given, meant in (("--res", "--resolution"), ("--mem=640", "--memory-limit")):
         assert f"{given} (is {meant} meant?)" in refused(capsys, "reconstruct", scan, "-o", "out", given)
     for given in ("--signed", "--version", "--voxel"):
