@@ -11,5 +11,6 @@ def ending_in(ending: str, path: str | os.PathLike) -> Path:
     ends in something else, upper and lower case aside."""
     path = Path(path)
     if path.name and path.suffix.lower() != ending:
-        raise InputError(f"'{path}' does not end in {ending}, which is what is written; name it {path.stem}{ending}")
+        name = path.stem if path.stem.lower().endswith(ending) else f"{path.stem}{ending}"
+        raise InputError(f"'{path}' does not end in {ending}, which is what is written; name it {name}")
     return path

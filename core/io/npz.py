@@ -35,7 +35,7 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
     Raises :class:`InputError` for paths that do not end in .npz, :class:`VADError` where the file cannot be written
     whole.
     """
-    field, near = result.field, result.field.near
+    path, field, near = ending_in(".npz", path), result.field, result.field.near
     node = np.stack(np.unravel_index(near.node, field.shape), axis=1)
     if isinstance(field, BandedField):
         gradient = node_gradient(field.blocks, field.spacing).stored
@@ -52,7 +52,6 @@ def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:
         direction=unit(near.step).astype(np.float32),
         foot=field.origin + field.spacing * node - near.step,
     )
-    path = ending_in(".npz", path)
     with atomic_path(path) as temporary, ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
         for name, array in arrays.items():  # numpy.savez would leave the archive open where the disk is full
             with archive.open(f"{name}.npy", "w", force_zip64=True) as file:

@@ -64,8 +64,8 @@ class Stretch:
 
     def nearest(self, row: np.ndarray, points: np.ndarray, tree: KDTree, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Distances (r,k) from samples `row` (r,) to the `count` nearest others, shortened to the side of the line by
-        the ratio, and their rows, (r,k), as among samples equally far apart each way; nearest first. They
-        are looked for among so many of the nearest as hold them where lines go on to all sides."""
+        the ratio, and their rows, (r,k), as among samples equally far apart each way; nearest first. They are
+        looked for among so many of the nearest as hold them where lines go on to all sides."""
         asked = int(np.ceil(count * self.ratio[row].max())) + 1
         distance, other = k_nearest(tree, points[row], asked)
         distance, other = distance[:, 1:], other[:, 1:]
