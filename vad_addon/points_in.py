@@ -13,6 +13,8 @@ from .attributes import Attribute
 
 READABLE = {"MESH", "POINTCLOUD", "CURVES", "CURVE"}
 _LARGE, _SHARE = 10, 0.25  # times the area for each vertex, of large faces; share of all area that these have at least
+_SHARP = 25.0  # degrees by which faces turn at half the edges or more: vertices are too few for the shape
+_MANY = 20_000  # vertices, of meshes that are not looked at for that
 AXIS = "vad_axis"  # attribute that holds the normal's axis where the user fixed it, in the object's space, else zeros
 
 
@@ -167,6 +169,12 @@ def _left_out(objects, found, carried, context):
                 f"{obj.name}: its vertices alone are read, and much of its area lies on faces far larger than these "
                 "are apart: for points all over it use Distribute Points on Faces in geometry nodes"
             )
+        elif (turn := _turn_of_faces(geometry.mesh)) > _SHARP:
+            yield (
+                f"{obj.name}: its vertices alone are read, and they are few for its shape: from face to face it turns "
+                f"by {turn:.0f} degrees; add Subdivision Surface, or points all over it by Distribute Points on Faces "
+                "in geometry nodes"
+            )
     names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
     names += [*found, *(group.name for obj in objects for group in obj.vertex_groups)]
     if lost := sorted(set(names) - set(carried)):
@@ -183,6 +191,19 @@ def _has_large_faces(mesh):
     area = _values(mesh.polygons, "area", np.float32).astype(np.float64)
     large = area * len(used) > _LARGE * area.sum()
     return len(used) > 0.9 * len(mesh.vertices) and area[large].sum() > _SHARE * area.sum()
+
+
+def _turn_of_faces(mesh):
+    """By how much faces of a mesh, None where there is none, turn at an edge, degrees, median; 0 of large meshes."""
+    if mesh is None or len(mesh.vertices) > _MANY:
+        return 0.0
+    edge, count = _values(mesh.loops, "edge_index", np.int32), _values(mesh.polygons, "loop_total", np.int32)
+    normal = _values(mesh.polygons, "normal", np.float32, 3)[np.repeat(np.arange(len(count)), count)]
+    order = np.argsort(edge, kind="stable")
+    one, other = order[:-1], order[1:]
+    shared = edge[one] == edge[other]
+    cosine = np.einsum("ij,ij->i", normal[one[shared]], normal[other[shared]])
+    return np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))) if len(cosine) else 0.0
 
 
 def _instances_with_points(geometry):
