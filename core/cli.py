@@ -34,7 +34,7 @@ from .settings import Settings, default_in_words, options
 from .surface.attributes import sample_attributes, vertex_attributes
 
 PROGRAM = "python -m core"
-_NO = "false", "no", "off", "0"
+_NO = "false", "no", "off", "0"  # after a flag, which takes none
 _MESHES = {kind: f"_{kind}.ply" for kind in ("double", "single", "signed")}
 _POINTS, _VOLUME, _ARRAYS, _REPORT = "_points.ply", ".vdb", ".npz", ".json"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
@@ -140,7 +140,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parsed(arguments):
-    """What was given. Raises :class:`SettingsError` for what no option takes, with the option that may be meant."""
+    """What was given. Raises :class:`SettingsError` for a scan without a command, with the two that there are, and for
+    what no option takes, with the option that may be meant."""
     if arguments and Path(arguments[0]).suffix.lower() in READERS:
         scan = shlex.quote(arguments[0])
         raise SettingsError(
@@ -149,16 +150,22 @@ def _parsed(arguments):
         )
     given, unknown = _parser().parse_known_args(arguments)
     if unknown:
-        name = unknown[0].partition("=")[0]
-        begun = list({option.replace("_", "-") for option in given.spelt if option.startswith(name)})
-        meant = begun if len(begun) == 1 else get_close_matches(name, given.spelt, 1, 0.75)
-        opposite = arguments[arguments.index(unknown[0]) - 1].replace("--", "--no-", 1)
-        meant = [opposite] if unknown[0].lower() in _NO and opposite in given.spelt else meant
+        meant = _meant(unknown[0], arguments[arguments.index(unknown[0]) - 1], given.spelt)
         raise SettingsError(
             f"unrecognized: {' '.join(unknown)}{f' (is {meant[0]} meant?)' if meant else ''}; {given.command} takes "
             f"one scan at a time, and the options of {PROGRAM} {given.command} --help"
         )
     return given
+
+
+def _meant(unknown, before, spelt):
+    """The option that may be meant by one that there is not, or by what follows one, `before`; one or none."""
+    opposite = before.replace("--", "--no-", 1)
+    if unknown.lower() in _NO and opposite in spelt:
+        return [opposite]
+    name = unknown.partition("=")[0]
+    begun = list({option.replace("_", "-") for option in spelt if option.startswith(name)})
+    return begun if len(begun) == 1 else get_close_matches(name, spelt, 1, 0.75)
 
 
 def _parser():

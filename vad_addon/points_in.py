@@ -12,6 +12,7 @@ from . import attributes, results
 from .attributes import Attribute
 
 READABLE = {"MESH", "POINTCLOUD", "CURVES", "CURVE"}
+_FACED = 0.9  # share of the vertices of modelled parts that have faces, at least
 _LARGE, _SHARE = 10, 0.25  # times the area for each vertex, of large faces; share of all area that these have at least
 _SHARP = 25.0  # degrees by which faces turn at half the edges or more: vertices are too few for the shape
 _MANY = 20_000  # vertices, of meshes that are not looked at for that
@@ -164,17 +165,8 @@ def _left_out(objects, found, carried, context):
                 f"{obj.name}: {count:,} instances count as a point each; for the points within them add Realize "
                 "Instances at the end of its geometry nodes"
             )
-        if _has_large_faces(geometry.mesh):
-            yield (
-                f"{obj.name}: its vertices alone are read, and much of its area lies on faces far larger than these "
-                "are apart: for points all over it use Distribute Points on Faces in geometry nodes"
-            )
-        elif (turn := _turn_of_faces(geometry.mesh)) > _SHARP:
-            yield (
-                f"{obj.name}: its vertices alone are read, and they are few for its shape: from face to face it turns "
-                f"by {turn:.0f} degrees; add Subdivision Surface, or points all over it by Distribute Points on Faces "
-                "in geometry nodes"
-            )
+        if missing := _missed_by_vertices(geometry.mesh):
+            yield f"{obj.name}: its vertices alone are read, and {missing}"
     names = [name for obj in objects if obj.type != "CURVE" for name in attributes.left_out(obj.data)]
     names += [*found, *(group.name for obj in objects for group in obj.vertex_groups)]
     if lost := sorted(set(names) - set(carried)):
@@ -182,21 +174,35 @@ def _left_out(objects, found, carried, context):
         yield f"Not carried over: {', '.join(lost)}; {kinds}"
 
 
-def _has_large_faces(mesh):
-    """Whether much of the area of a mesh, None where there is none, lies on faces larger than its vertices are close
-    together: the caps of a cylinder of 128 sides are a third of it. Never where a tenth of its vertices have none."""
-    if mesh is None or not len(mesh.polygons):
-        return False
-    used = np.unique(_values(mesh.loops, "vertex_index", np.int32))
+def _missed_by_vertices(mesh):
+    """What the vertices of a mesh, None where there is none, do not show of it, and what helps; empty where they may.
+
+    Faces may be far larger than vertices are close together: the caps of a cylinder of 128 sides are a third of it. Or
+    vertices are few for the shape, as Suzanne's. Of scans, where a tenth of them or more have no face, nothing is said.
+    """
+    if mesh is None:
+        return ""
+    faced = len(np.unique(_values(mesh.loops, "vertex_index", np.int32)))
+    if faced <= _FACED * len(mesh.vertices):
+        return ""
     area = _values(mesh.polygons, "area", np.float32).astype(np.float64)
-    large = area * len(used) > _LARGE * area.sum()
-    return len(used) > 0.9 * len(mesh.vertices) and area[large].sum() > _SHARE * area.sum()
+    large = area * faced > _LARGE * area.sum()
+    if area[large].sum() > _SHARE * area.sum():
+        return (
+            "much of its area lies on faces far larger than these are apart: for points all over it use Distribute "
+            "Points on Faces in geometry nodes"
+        )
+    turn = _turn_of_faces(mesh) if len(mesh.vertices) <= _MANY else 0.0
+    if turn > _SHARP:
+        return (
+            f"they are few for its shape: from face to face it turns by {turn:.0f} degrees; add Subdivision Surface, "
+            "or points all over it by Distribute Points on Faces in geometry nodes"
+        )
+    return ""
 
 
 def _turn_of_faces(mesh):
-    """By how much faces of a mesh, None where there is none, turn at an edge, degrees, median; 0 of large meshes."""
-    if mesh is None or len(mesh.vertices) > _MANY:
-        return 0.0
+    """By how much faces of a mesh turn at an edge, degrees, median."""
     edge, count = _values(mesh.loops, "edge_index", np.int32), _values(mesh.polygons, "loop_total", np.int32)
     normal = _values(mesh.polygons, "normal", np.float32, 3)[np.repeat(np.arange(len(count)), count)]
     order = np.argsort(edge, kind="stable")

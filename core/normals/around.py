@@ -51,14 +51,13 @@ class Around:
         near = np.exp(-((distance / (_WIDTH * spacing[:, None])) ** 2))
         return other, step / np.linalg.norm(step, axis=2)[..., None], near
 
-    def are_founded(self, row, other, axes, weight):
+    def are_founded(self, row, other, direction, axes, weight):
         """Whether planes through samples `row` (p,) of a part, with unit axes (p,3), are those of the surface for all
         that lies in them, (p,) bool: any two lines lie in one, so that on lines there have to be more. In each plane
-        lie the neighbours `other` (p,k), by weights (p,k)."""
-        if not len(row) or not self.are_on_lines(row):
+        lie the neighbours `other` (p,k), in unit directions (p,k,3), by weights (p,k)."""
+        if not self.are_on_lines(row):
             return np.ones(len(row), bool)
         step = self.points[other] - self.points[row, None]
-        direction = step / np.linalg.norm(step, axis=2)[..., None]
         weight = weight * self.stretch.squared_sine(row[:, None], direction)
         total = np.maximum(weight.sum(axis=1), _LEAST)
         offset = row_dots(step, np.cross(self.stretch.along[row], axes)[:, None])
@@ -74,5 +73,5 @@ class Around:
         return self.stretch.squared_sine(row[:, None], direction) > _ASIDE**2
 
     def are_on_lines(self, row):
-        """Whether the samples `row` of a part are."""
-        return self.stretch is not None and self.stretch.ratio[row[0]] > 1
+        """Whether the samples `row` of a part are, or of what is left of one, which may be none."""
+        return self.stretch is not None and len(row) > 0 and self.stretch.ratio[row[0]] > 1

@@ -60,7 +60,8 @@ def _fullest(row, around, normals, within):
     of, plane = np.nonzero(full)
     weight = inside[of, plane] * near[of]
     alike = row_dots(weight, row_dots(axes[of, plane][:, None], normals[other[of]]) ** 2)
-    founded = (alike >= _ALIKE * share[of, plane]) & around.are_founded(row[of], other[of], axes[of, plane], weight)
+    founded = around.are_founded(row[of], other[of], direction[of], axes[of, plane], weight)
+    founded &= alike >= _ALIKE * share[of, plane]
     share[of[~founded], plane[~founded]] = 0
 
     every, best = np.arange(len(row)), share.argmax(axis=1)

@@ -477,6 +477,16 @@ def test_subdivided_they_are_enough(blender, extension):
     assert not extension("vad_addon.points_in").gather([obj], blender.context).warnings
 
 
+def test_a_scan_with_a_box_beside_it_is_one(add_mesh, blender, extension):
+    obj = add_mesh("Scan", np.random.default_rng(0).random((1000, 3)) + 2)
+    blender.ops.mesh.primitive_cube_add()
+    blender.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    blender.ops.object.join()
+    assert len(obj.data.polygons) == 6
+    assert extension("vad_addon.points_in").gather([obj], blender.context).warnings == ()
+
+
 @pytest.mark.parametrize("loose", [False, True], ids=["a base", "loose points"])
 def test_a_scan_with_a_large_face_is_one(add_mesh, blender, extension, loose):
     x, y = np.divmod(np.arange(2500), 50)
