@@ -60,6 +60,18 @@ def span_of(points: np.ndarray, powers: str, least: float, most: float) -> float
     return span
 
 
+def attribute_rows(name: str, given, count: int) -> np.ndarray:
+    """An array-like of `count` rows of any type, masked where it is, for the attribute of that name. Raises
+    :class:`InputError` for what is no array, and for another number of rows."""
+    try:
+        values = np.asanyarray(given)
+    except ValueError as error:
+        raise InputError(f"attribute {name!r} is no array ({error}); give {count} rows") from error
+    if values.shape[:1] != (count,):
+        raise InputError(f"attribute {name!r} has shape {values.shape}; give {count} rows")
+    return values
+
+
 def spacing_of(points: np.ndarray, given) -> np.ndarray:
     """Local spacing (n,) float64 of points (n,3). Raises :class:`InputError` for another shape, and for what is not
     above 0 and finite."""

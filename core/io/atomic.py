@@ -9,6 +9,7 @@ from threading import local
 from uuid import uuid4
 
 from ..errors import VADError
+from .paths import path_of
 
 ELSEWHERE = "choose another folder"  # what helps, in most places
 
@@ -71,7 +72,7 @@ def atomic_path(path: str | os.PathLike, otherwise: str = ELSEWHERE) -> Iterator
     (folder missing or not writable, disk full) becomes a :class:`VADError` of one line, which says what to do
     `otherwise`.
     """
-    path = Path(path)
+    path = path_of(path)
     if not path.name:
         raise VADError(f"'{path}' is a folder; give the path of a file")
     temporary = _beside(path)
@@ -109,7 +110,7 @@ def _remove(temporary):
 def writable_folder(path: str | os.PathLike, otherwise: str = ELSEWHERE) -> Path:
     """Make the folder `path` where it is missing, and prove that files can be made in it. Raises :class:`VADError`,
     which says what to do `otherwise`."""
-    path = Path(path)
+    path = path_of(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):

@@ -10,7 +10,7 @@ from ..field.distance_field import BandedField
 from ..linalg import unit
 from ..reconstruction import Reconstruction
 from .atomic import atomic_path
-from .endings import ending_in
+from .paths import ending_in
 
 
 def write_arrays(path: str | os.PathLike, result: Reconstruction) -> None:

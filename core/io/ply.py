@@ -11,11 +11,11 @@ import numpy as np
 from plyfile import PlyData, PlyElement
 
 from ..errors import InputError
-from ..given_arrays import points_array, real_numbers
+from ..given_arrays import attribute_rows, points_array, real_numbers
 from ..surface.mesh import Mesh
 from .atomic import atomic_path
-from .endings import ending_in
 from .own_files import MADE_BY
+from .paths import ending_in
 
 _NAME = re.compile(r"[!-~]+")
 _TYPES = "i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"
@@ -80,17 +80,19 @@ def _records(fields, attributes):
 
 
 def _column(name, values, count, taken):
-    values = np.asarray(values)
+    values = attribute_rows(name, values, count)
     if name in taken or not isinstance(name, str) or not _NAME.fullmatch(name):
         raise InputError(
             f"a PLY file cannot have an attribute named {name!r}; choose a name without blanks, in ASCII, other than "
             f"{', '.join(taken)}"
         )
-    if values.shape != (count,) or values.dtype.kind not in "biuf":
+    if values.ndim != 1 or values.dtype.kind not in "biuf":
         raise InputError(
             f"attribute {name!r} has shape {values.shape} and type {values.dtype}; give one number for each of "
             f"{count} rows"
         )
+    if np.ma.is_masked(values):
+        raise InputError(f"attribute {name!r} is masked in {np.ma.count_masked(values)} rows; give a number for each")
     if values.dtype.kind == "b":
         return values.astype(np.uint8)
     if values.dtype.str[1:] in _TYPES:

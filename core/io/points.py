@@ -1,11 +1,11 @@
 """Points from files."""
 
 import os
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError, MissingDependency
+from .paths import path_of
 from .read_numpy import read_npy, read_npz
 from .read_text import read_obj, read_text
 
@@ -68,7 +68,7 @@ def read_scan(path: str | os.PathLike) -> tuple[np.ndarray, dict[str, np.ndarray
 
     Normals are left out: they belong to the surface the points came from.
     """
-    path = Path(path)
+    path = path_of(path)
     try:
         read = _reader(path)
         points, attributes = read(path)

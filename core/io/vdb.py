@@ -9,9 +9,9 @@ from ..errors import InputError, VADError
 from ..field.blocks import each, node_gradient
 from ..field.distance_field import BandedField, DistanceField
 from .atomic import ELSEWHERE, atomic_path
-from .endings import ending_in
 from .openvdb_module import fill, load_openvdb
 from .own_files import MADE_BY
+from .paths import ending_in
 
 _SMALLEST = 1.5e-5  # the cube of a voxel's size counts as zero below 3e-15
 _FOG_CELLS = 2.0  # the visible fog fades out at this distance from the surface

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ..errors import InputError
+from ..given_arrays import attribute_rows
 from ..reconstruction import Reconstruction
 from .mesh import Mesh
 
@@ -32,25 +33,13 @@ def vertex_attributes(mesh: Mesh, result: Reconstruction, carried: dict | None =
 def sample_attributes(result: Reconstruction, carried: dict | None = None) -> dict[str, np.ndarray]:
     """The same for each sample of the result, (n',) or (n',k), but for the distance."""
     count = result.report["counts"]["input"]
-    carried = {name: _rows(name, values, count) for name, values in (carried or {}).items()}
+    carried = {name: attribute_rows(name, values, count) for name, values in (carried or {}).items()}
     kept = {"confidence": result.confidence.astype(np.float32)}
     for name, values in carried.items():
         while name in _OWN or name in kept:
             name = _OTHERS + name
         kept[name] = values[result.source_index]
     return kept
-
-
-def _rows(name, values, count):
-    try:
-        values = np.asarray(values)
-    except ValueError as error:
-        raise InputError(
-            f"attribute {name!r} is no array ({error}); give one row for each of {count} points"
-        ) from error
-    if values.shape[:1] != (count,):
-        raise InputError(f"attribute {name!r} has shape {values.shape}; give one row for each of {count} points")
-    return values
 
 
 def nearest_samples(mesh: Mesh, result: Reconstruction) -> np.ndarray:

@@ -47,9 +47,17 @@ def test_a_mesh_that_was_not_asked_for_is_refused(sphere_run):
         vertex_attributes(None, sphere_run)
 
 
+def test_what_is_masked_at_points_is_so_at_vertices(sphere_run):
+    count = sphere_run.report["counts"]["input"]
+    given = np.ma.masked_less(np.arange(count), count // 2)
+    found = vertex_attributes(sphere_run.surface, sphere_run, {"class": given})["class"]
+    np.testing.assert_array_equal(np.ma.getmaskarray(found), found.data < count // 2)
+    assert 0 < np.ma.count_masked(found) < len(found)
+
+
 def test_a_row_for_each_point_of_the_input_is_needed(sphere_run):
     for label, shape in ((np.zeros(1499), r"\(1499,\)"), (5, r"\(\)")):
-        with pytest.raises(InputError, match=f"'label' has shape {shape}; give one row for each of 1500 points"):
+        with pytest.raises(InputError, match=f"'label' has shape {shape}; give 1500 rows"):
             vertex_attributes(sphere_run.surface, sphere_run, {"label": label})
-    with pytest.raises(InputError, match=r"'label' is no array \(.*\); give one row for each of 1500 points"):
+    with pytest.raises(InputError, match=r"'label' is no array \(.*\); give 1500 rows"):
         vertex_attributes(sphere_run.surface, sphere_run, {"label": [[1, 2, 3], [4, 5]]})

@@ -5,9 +5,12 @@ import os
 import pytest
 
 from core import InputError, Settings, reconstruct
-from core.io.endings import ending_in
+from core.io.atomic import writable_folder
 from core.io.npz import write_arrays
+from core.io.paths import ending_in
 from core.io.ply import write_mesh, write_points
+from core.io.points import read_points
+from core.io.report import write_report
 from core.io.vdb import write_vdb
 from tests import shapes
 
@@ -40,6 +43,14 @@ def test_upper_case_is_taken(tmp_path, result, kind):
     name = f"SCAN{kind.split()[0].upper()}"
     WRITERS[kind](tmp_path / name, result)
     assert os.listdir(tmp_path) == [name]
+
+
+@pytest.mark.parametrize("path", [5, None, b"scan.ply", "sc\0an.ply", "sc\ud800an.ply"])
+def test_what_is_no_path_is_refused(result, path):
+    uses = [*WRITERS.values(), lambda path, _: read_points(path), lambda path, _: writable_folder(path)]
+    for use in [*uses, lambda path, result: write_report(path, result.report)]:
+        with pytest.raises(InputError, match="is not the path of a file"):
+            use(path, result)
 
 
 def test_text_is_taken_for_a_path():
