@@ -72,6 +72,8 @@ def _sides(sheet):
     """Around each edge its faces are in order of their angles, and the side of each that faces ahead is joined to the
     side of the next one that faces back; of a face alone, both its sides. So the sides around a vertex follow each
     other in cycles: from low end to low end one way, from high end to high end the other."""
+    if (sheet.edges.count == 2).all() and sheet.edges.alike.all():
+        return _apart(sheet)
     corner, corners = sheet.faces.reshape(-1), sheet.faces.dtype.type(sheet.faces.size)
     edge, count = sheet.edges.number.reshape(-1), sheet.edges.count
     order, several = order_around(sheet), np.repeat(count, count)
@@ -92,6 +94,16 @@ def _sides(sheet):
     middle[order[row] + ahead[row]] = middle[following[row] + back[row]] = n + np.arange(len(row))
     shape = 2, *sheet.faces.shape
     return _Sides(vertex.reshape(shape), middle.reshape(shape), corner[ends[:, order[row]]])
+
+
+def _apart(sheet):
+    """The same of a closed sheet that is wound alike, whose fronts are joined to fronts and backs to backs."""
+    one, two = np.argsort(sheet.edges.number.reshape(-1), kind="stable").astype(sheet.faces.dtype).reshape(-1, 2).T
+    across = np.empty(sheet.faces.size, sheet.faces.dtype)
+    across[one], across[two] = two, one
+    n, vertex = _cycles(corner_after(across))
+    vertex = np.stack([vertex, vertex + n]).reshape(2, *sheet.faces.shape)
+    return _Sides(vertex, np.full_like(vertex, -1), np.empty((2, 0), sheet.faces.dtype))
 
 
 def _cycles(after):
@@ -142,6 +154,8 @@ def _halved(mesh, middle):
     """The mesh with the edges of faces halved that have a vertex in the `middle`, (f,3), from each corner to the next;
     -1 where there is none."""
     cut = (middle >= 0).any(axis=1)
+    if not cut.any():
+        return mesh
     rest, faces, middle = mesh.of_faces(~cut), mesh.faces[cut], middle[cut]
     for _ in range(3):
         cut = (middle >= 0).any(axis=1)
@@ -156,7 +170,10 @@ def _halved(mesh, middle):
 def _turned(sheet):
     """The sheet with the diagonal of each quad turned that leads from border to border where the other one does not,
     and is no edge."""
-    on_border, quads = sheet.edges.ends_at(sheet.edges.count == 1) > 0, sheet.quads
+    border, quads = sheet.edges.count == 1, sheet.quads
+    if not border.any():
+        return sheet
+    on_border = sheet.edges.ends_at(border) > 0
     row = np.flatnonzero(on_border[quads[:, ::2]].all(axis=1) & ~on_border[quads[:, 1::2]].all(axis=1))
     if not len(row):
         return sheet

@@ -14,7 +14,7 @@ around an open sheet, no side need be asked: nothing is inside.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -24,6 +24,7 @@ from ...field.grid import ADJACENT, Grid, node_strides
 from ...field.local_surface import LocalSurface
 from ...linalg import conjugate_gradients, symmetric
 from ...lookup import numbered
+from ...parallel import side_by_side
 from ...parts import near_parts
 from ...progress import Progress
 from ..edges.crossings import Crossings
@@ -94,9 +95,9 @@ class Sides:
         return each(lambda inside, u: np.where(inside, -u, u), self.inside, values)
 
 
-def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None) -> Sides:
+def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, progress=None, far=None) -> Sides:
     """Sides of all nodes, from their unsigned distances `values` (nx,ny,nz) float32, or Blocks of a band wider than
-    :func:`needed_band`, and the crossed grid edges.
+    :func:`needed_band`, the crossed grid edges, and what :func:`far_regions` finds where that is known already.
 
     Openings narrower than the bridging length (but 12 cells) are spanned, by the fewest edges. Of a surface with the
     outside on both sides of most samples every crossing has one side at both ends. Raises :class:`InputError` for
@@ -104,7 +105,7 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
     """
     grid.check(surface.points, np.shape(values))
     progress = Progress.of(progress)
-    near, labels, count = _far_regions(values, surface, grid)
+    near, labels, count = far or far_regions(values, surface, grid)
     outside = _outside(labels)
     if _is_open(labels, surface, grid):
         low, axis = np.divmod(crossings.changing_sides, 3)
@@ -128,12 +129,12 @@ def find_sides(values, crossings: Crossings, surface: LocalSurface, grid: Grid, 
 def may_be_closed(values, surface: LocalSurface, grid: Grid) -> bool:
     """Whether the sides of :func:`find_sides`, from the same distances, may be closed: not where many of the samples
     that have regions on both sides have one region there. On shapes that are closed it is less than 1 % of them."""
-    one, other = _seen(_far_regions(values, surface, grid)[1], surface, grid).T
+    one, other = _seen(far_regions(values, surface, grid)[1], surface, grid).T
     both = (one > 0) & (other > 0)
     return (both & (one == other)).sum() <= _OPEN * both.sum()
 
 
-def _far_regions(values, surface, grid):
+def far_regions(values, surface: LocalSurface, grid: Grid) -> tuple:
     """Which nodes are near the surface and off the sides of the box, the regions of the others, and their number."""
     limit = np.float32(_far(surface, grid) * grid.spacing)
     near = each(lambda u, inner: inner & (u <= limit), values, inner_nodes(values))
@@ -150,7 +151,7 @@ def _is_open(labels, surface, grid):
 
 
 def _seen(labels, surface, grid):
-    """The regions of :func:`_far_regions` on either side of each sample, (n,2); 0 where there is none."""
+    """The regions of :func:`far_regions` on either side of each sample, (n,2); 0 where there is none."""
     return regions_beside(labels, surface, _far(surface, grid) * grid.spacing, grid)
 
 
@@ -240,21 +241,22 @@ def _numbered(node, alone, grid):
 
 
 def _sides(edges: Iterable, n, outside, progress):
-    """The side of each of n clusters in [-1,1], from edges between them, parts of (a, b, crossed), (e,) each; cluster
-    `outside` is 1."""
-    links, push, degree = csr_matrix((n, n)), np.zeros(n), np.zeros(n)
+    """The side of each of n clusters in [-1,1], float32, from edges between them, parts of (a, b, crossed), (e,) each;
+    cluster `outside` is 1."""
+    links, push, degree = csr_matrix((n, n), dtype=np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
     for a, b, crossed in edges:
         kept = a != b
-        a, b, weight = a[kept], b[kept], np.where(crossed[kept], -1.0, 1.0)
+        a, b, weight = a[kept], b[kept], np.where(crossed[kept], np.float32(-1.0), np.float32(1.0))
         degree += np.bincount(a, minlength=n) + np.bincount(b, minlength=n)
         free = (a != outside) & (b != outside)
         links += symmetric(weight[free], a[free], b[free], n)
         push += np.bincount((a + b - outside)[~free], weight[~free], n)
     progress(0.3)
     steps = progress.part(0.4, 0.7).each(range(_STEPS))
-    scale = np.maximum(degree, 1.0)
+    scale = np.maximum(degree, np.float32(1.0))
+    start = np.zeros_like(push)
     side = conjugate_gradients(
-        lambda x: degree * x - links @ x, push, np.zeros(n), lambda residual: residual / scale, _TOLERANCE, steps
+        lambda x: degree * x - links @ x, push, start, lambda residual: residual / scale, _TOLERANCE, steps
     )
     side[outside] = 1
     return side
@@ -264,16 +266,27 @@ def _without_specks(inside, beside, surface, grid):
     """The inside with specks turned over: connected sets of less than _SPECK nodes on one side. Those with a node whose
     nearest sample is marked in `beside` (n,) stay, if they are few of the nodes on their side: thin walls and slits
     hold no more."""
-    for side in (True, False):
-        part, _ = regions(each(lambda here: here == side, inside))  # noqa: B023  called at once
-        size = counts(part)
-        small = size < _SPECK
-        small[0] = False
-        if not small.any():
-            continue
-        node = marked_nodes(each(lambda name: small[name], part))  # noqa: B023
-        between = beside[surface.tree.query(grid.positions(node), workers=-1)[1]]
-        held = np.unique(at_nodes(part, node[between]))
-        small[held] = size[held].sum() > _HELD * size[1:].sum()
-        inside = each(lambda here, name: here ^ small[name], inside, part)  # noqa: B023
-    return inside
+    within, without = side_by_side(partial(_parts, inside), partial(_parts, each(np.logical_not, inside)))
+    filled = _turned(inside, within, beside, surface, grid)
+    if filled is not inside:
+        without = _parts(each(np.logical_not, filled))
+    return _turned(filled, without, beside, surface, grid)
+
+
+def _parts(here):
+    """The labels of the connected sets of nodes that are marked."""
+    return regions(here)[0]
+
+
+def _turned(inside, part, beside, surface, grid):
+    """The inside with the specks among the labelled sets `part` turned over; itself where there are none."""
+    size = counts(part)
+    small = size < _SPECK
+    small[0] = False
+    if not small.any():
+        return inside
+    node = marked_nodes(each(lambda name: small[name], part))
+    between = beside[surface.tree.query(grid.positions(node), workers=-1)[1]]
+    held = np.unique(at_nodes(part, node[between]))
+    small[held] = size[held].sum() > _HELD * size[1:].sum()
+    return each(lambda here, name: here ^ small[name], inside, part)

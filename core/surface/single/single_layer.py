@@ -10,6 +10,7 @@ from ...field.blocks import Blocks
 from ...field.grid import Grid
 from ...field.local_surface import LocalSurface
 from ...field.steps import NearBand
+from ...parallel import beside
 from ...progress import Progress
 from ...settings import Settings
 from ..double.double_cover import double_cover
@@ -18,7 +19,7 @@ from ..edges.crossings import Crossings, find_crossings
 from ..edges.meetings import FEW, Meetings, find_meetings
 from ..mesh import Mesh
 from ..meshing.misfit import BETTER, ROUGH, SHOWN, Misfit, misfit
-from ..signs.sides import Sides, find_sides
+from ..signs.sides import Sides, far_regions, find_sides
 from ..signs.two_sides import two_sided
 from .routes import sheet_between_sides, sheet_of_crossings, sheet_of_sides
 from .thin_walls import with_thin_walls
@@ -88,8 +89,9 @@ class SingleLayer:
         return other if other[1].complete else found
 
     def _found_by(self, meetings, progress):
-        crossings = find_crossings(self.band, self.local, self.grid, progress.part(0.0, 0.6), meetings)
-        return crossings, find_sides(self.values, crossings, self.local, self.grid, progress.part(0.6, 1.0))
+        with beside(partial(far_regions, self.values, self.local, self.grid)) as far:
+            crossings = find_crossings(self.band, self.local, self.grid, progress.part(0.0, 0.6), meetings)
+        return crossings, find_sides(self.values, crossings, self.local, self.grid, progress.part(0.6, 1.0), far())
 
     @cached_property
     def two_sides(self) -> np.ndarray | Blocks | None:

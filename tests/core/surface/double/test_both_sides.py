@@ -85,6 +85,14 @@ def octahedron():
     return Mesh(corners, np.array([*upper, *([b, a, 5] for a, b, _ in upper)], np.int32))
 
 
+def octahedra():
+    """Two that touch in a vertex, wound alike."""
+    one = octahedron()
+    faces = np.concatenate([one.faces, one.faces + 6])
+    faces[faces == 6 + 3] = 0
+    return Mesh(np.concatenate([one.vertices, one.vertices + np.array([2, 0, 0])]), faces)
+
+
 def band(columns, rows=12):
     """A Moebius band, wound alike but where its ends meet."""
     flat = strip(rows, columns)
@@ -142,6 +150,7 @@ SHEETS = {  # and how many pieces their covers have, of which Euler characterist
     "triangles that touch": (touching(), [2, 2]),
     "a patch with a hole": (strip(3, 3).of_faces(~np.isin(np.arange(18), [4, 13])), [0]),
     "a closed one": (octahedron(), [2, 2]),
+    "closed ones that touch": (octahedra(), [2] * 4),
     "a one-sided band": (band(3), [0]),
     "one of a quad's width": (band(1), [0]),
     "a closed one with one side": (projective_plane(), [2]),
@@ -199,6 +208,16 @@ def test_the_outer_layer_of_a_closed_sheet_faces_out():
     volumes = sorted(shapes.signed_volume(piece) for piece in shapes.components(both_sides(octahedron(), CELL)))
     np.testing.assert_allclose(volumes, [-4 / 3, 4 / 3], rtol=1e-3)
     assert -volumes[0] < 4 / 3 < volumes[1]
+
+
+@pytest.mark.parametrize("sheet", [octahedron(), octahedra()])
+def test_a_closed_sheet_has_the_same_sides_beside_an_open_one(sheet):
+    """Of closed ones alone, wound alike, fronts are joined to fronts at once."""
+    n, away = len(sheet.vertices), np.array([[9, 0, 0], [9, 1, 0], [9, 0, 1.0]])
+    both = Mesh(np.concatenate([sheet.vertices, away]), np.concatenate([sheet.faces, [[n, n + 1, n + 2]]]), 0)
+    alone, beside = both_sides(sheet, CELL), both_sides(both, CELL)
+    beside = beside.of_faces((beside.vertices[beside.faces, 0] < 9).all(axis=1))
+    np.testing.assert_array_equal(beside.vertices[beside.faces], alone.vertices[alone.faces])
 
 
 def test_faces_may_be_wound_unlike():

@@ -165,6 +165,15 @@ def test_a_speck_is_no_inside_but_between_sheets_side_by_side(surface, beside):
     )
 
 
+def test_a_hollow_speck_leaves_nothing_behind(surface):
+    """The node in its middle is of the outside around it once the speck is."""
+    inside, distance = RADIUS < 1, np.abs(RADIUS - 1)
+    inside[2:5, 2:5, 2:5], distance[1:6, 1:6, 1:6] = True, 0.05
+    inside[3, 3, 3] = False
+    sides = find_sides(distance, crossings_of(inside), surface, GRID)
+    np.testing.assert_array_equal(sides.inside, RADIUS < 1)
+
+
 def test_specks_alone_make_no_inside(surface):
     """As those between the layers of a folded cloth."""
     inside, distance = np.zeros(GRID.shape, bool), np.full(GRID.shape, 9.0)
