@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
@@ -20,12 +20,14 @@ from .errors import Cancelled, InputError, MemoryBudgetError, MissingDependency,
 from .exit_status import BAD_INPUT, CANCELLED, DONE, REQUESTS_TO_END, TOO_LARGE
 from .field.grid import fit_grid
 from .io.atomic import together, writable_folder
+from .io.faces import read_faces
 from .io.npz import write_arrays
 from .io.own_files import is_own
 from .io.ply import write_mesh, write_points
 from .io.points import READERS, read_points, read_scan
 from .io.report import digest_of, report_json, report_of, write_report
 from .io.vdb import write_vdb
+from .modelled import MANY, Faces, missed_by_vertices
 from .pipeline import reconstruct
 from .points import first_of_each
 from .prospect import look_ahead
@@ -37,6 +39,8 @@ PROGRAM = "python -m core"
 _NO = "false", "no", "off", "0"  # after a flag, which takes none
 _MESHES = {kind: f"_{kind}.ply" for kind in ("double", "single", "signed")}
 _POINTS, _VOLUME, _ARRAYS, _REPORT = "_points.ply", ".vdb", ".npz", ".json"
+_SAMPLED = "give points sampled all over its faces"
+_REFINED = "subdivide it, or give points sampled all over its faces"
 _BAR = "{percentage:3.0f}% |{bar}| {elapsed}  {desc}"
 
 _DESCRIPTION = "Reconstruct a surface from a point cloud without normals: distance field, mesh and normals."
@@ -245,10 +249,21 @@ def _reconstruct(given):
     _spare(given.scan, digest, folder, given.arrays)
     with _progress() as progress:
         result = reconstruct(points, settings, progress=progress)
+    said = [*result.report["warnings"], *_missed(given.scan, points)]
+    result = replace(result, report={**result.report, "warnings": said})
     report = _write(result, carried, folder, given.scan, digest, given.gradient, given.arrays)
     for warning in report["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
     print(report_json(report) if given.json else _summary(report))
+
+
+def _missed(scan, points):
+    """What the points of a scan do not show of the mesh that they are of, if it is one of few vertices: no or one line.
+    Where these are many, reading faces takes long, and they mostly show all."""
+    if len(points) > MANY or not np.isfinite(points).all():
+        return []
+    missed = missed_by_vertices(Faces.of(points, *read_faces(scan, len(points))), _SAMPLED, _REFINED)
+    return [f"{scan} is a mesh: its vertices alone are read, and {missed}"] if missed else []
 
 
 def _spare(scan, digest, folder, arrays):
@@ -371,7 +386,8 @@ def _info(given):
         "crowded": found.crowded,
         "estimate": asdict(estimate_cost(spacing, grid, settings, found.noisy, found.crowded)),
     }
-    print(report_json(facts) if given.json else _described(facts))
+    missed = _missed(given.scan, points)
+    print(report_json(facts | {"warnings": missed}) if given.json else "\n".join([_described(facts), *missed]))
 
 
 def _described(facts):

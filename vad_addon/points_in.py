@@ -7,15 +7,14 @@ import bpy
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.modelled import Faces, missed_by_vertices
 from ..core.points import MINIMUM_SAMPLES
 from . import attributes, results
 from .attributes import Attribute
 
 READABLE = {"MESH", "POINTCLOUD", "CURVES", "CURVE"}
-_FACED = 0.9  # share of the vertices of modelled parts that have faces, at least
-_LARGE, _SHARE = 10, 0.25  # times the area for each vertex, of large faces; share of all area that these have at least
-_SHARP = 25.0  # degrees by which faces turn at half the edges or more: vertices are too few for the shape
-_MANY = 20_000  # vertices, of meshes that are not looked at for that
+_SAMPLED = "for points all over it use Distribute Points on Faces in geometry nodes"
+_REFINED = "add Subdivision Surface, or points all over it by Distribute Points on Faces in geometry nodes"
 AXIS = "vad_axis"  # attribute that holds the normal's axis where the user fixed it, in the object's space, else zeros
 
 
@@ -175,41 +174,12 @@ def _left_out(objects, found, carried, context):
 
 
 def _missed_by_vertices(mesh):
-    """What the vertices of a mesh, None where there is none, do not show of it, and what helps; empty where they may.
-
-    Faces may be far larger than vertices are close together: the caps of a cylinder of 128 sides are a third of it. Or
-    vertices are few for the shape, as Suzanne's. Of scans, where a tenth of them or more have no face, nothing is said.
-    """
+    """What the vertices of a mesh, None where there is none, do not show of it; empty where they may show all."""
     if mesh is None:
         return ""
-    faced = len(np.unique(_values(mesh.loops, "vertex_index", np.int32)))
-    if faced <= _FACED * len(mesh.vertices):
-        return ""
-    area = _values(mesh.polygons, "area", np.float32).astype(np.float64)
-    large = area * faced > _LARGE * area.sum()
-    if area[large].sum() > _SHARE * area.sum():
-        return (
-            "much of its area lies on faces far larger than these are apart: for points all over it use Distribute "
-            "Points on Faces in geometry nodes"
-        )
-    turn = _turn_of_faces(mesh) if len(mesh.vertices) <= _MANY else 0.0
-    if turn > _SHARP:
-        return (
-            f"they are few for its shape: from face to face it turns by {turn:.0f} degrees; add Subdivision Surface, "
-            "or points all over it by Distribute Points on Faces in geometry nodes"
-        )
-    return ""
-
-
-def _turn_of_faces(mesh):
-    """By how much faces of a mesh turn at an edge, degrees, median."""
-    edge, count = _values(mesh.loops, "edge_index", np.int32), _values(mesh.polygons, "loop_total", np.int32)
-    normal = _values(mesh.polygons, "normal", np.float32, 3)[np.repeat(np.arange(len(count)), count)]
-    order = np.argsort(edge, kind="stable")
-    one, other = order[:-1], order[1:]
-    shared = edge[one] == edge[other]
-    cosine = np.einsum("ij,ij->i", normal[one[shared]], normal[other[shared]])
-    return np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))) if len(cosine) else 0.0
+    corners, sizes = _values(mesh.loops, "vertex_index", np.int32), _values(mesh.polygons, "loop_total", np.int32)
+    areas, normals = _values(mesh.polygons, "area", np.float32), _values(mesh.polygons, "normal", np.float32, 3)
+    return missed_by_vertices(Faces(len(mesh.vertices), corners, sizes, areas, normals), _SAMPLED, _REFINED)
 
 
 def _instances_with_points(geometry):

@@ -15,6 +15,7 @@ from .not_a_number import spelt_plainly
 
 _FIRST_LINE = re.compile(rb"(?:" + BOM_UTF8 + rb")?ply[ \t]*(\r\n|\n|\r)", re.IGNORECASE)
 _IGNORED = re.compile(rb"((comment|obj_info)\b.*)?", re.DOTALL)
+_AROUND = {"vertex_indices", "vertex_index"}  # of faces
 _NO_ASCII = re.compile(r"[^!-~]+")
 _ELEMENT = re.compile(rb"^(element[ \t]+\S+)[ \t]+(-?\d+)$", re.MULTILINE)
 
@@ -25,6 +26,23 @@ def read_ply(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         return _read(path.read_bytes())
     except (PlyParseError, ValueError, OverflowError) as error:
         raise InputError(f"{path} is not a sound PLY file: {error}") from error
+
+
+def ply_faces(path: Path) -> list[np.ndarray]:
+    """The vertices around each face, (k,) each. Raises :class:`ValueError` for faces that are not sound."""
+    content = path.read_bytes()
+    layout, counts, start = _header(content)
+    names = [element.name for element in layout]
+    if "face" not in names:
+        return []
+    last = names.index("face")
+    around = {p.name for p in layout.elements[last].properties if isinstance(p, PlyListProperty)} & _AROUND
+    if not around:
+        return []
+    try:
+        return list(_read_rows(layout.elements[: last + 1], counts, layout, content[start:])[0][around.pop()])
+    except PlyParseError as error:
+        raise ValueError(str(error)) from error
 
 
 def _read(content):

@@ -49,6 +49,19 @@ def read_obj(path: Path) -> np.ndarray:
         return _table(path, lines, vertices, None, (0, 1, 2))
 
 
+def obj_faces(path: Path) -> list[np.ndarray]:
+    """The vertices around each face of a Wavefront OBJ file, (k,) int64 each. Raises :class:`ValueError` for faces that
+    are not sound."""
+    faces, count = [], 0
+    with _open(path) as file:
+        for kind, *corners in map(str.split, _Lines(file)):
+            count += kind == "v"
+            if kind == "f":
+                number = np.array([int(corner.partition("/")[0]) for corner in corners], np.int64)
+                faces.append(np.where(number < 0, number + count, number - 1))  # those below 0 count from the last one
+    return faces
+
+
 class _Lines:
     """The lines that hold more than blanks and comments, without these and what ends them; remembers the last one
     handed out, and the last comment on a line of its own."""

@@ -540,6 +540,26 @@ def test_info_tells_near_copies_from_duplicates(capsys, tmp_path):
     assert 400 <= facts["near_copies"] < 420
 
 
+@pytest.fixture
+def cube(tmp_path):
+    """A cube of eight vertices, as modelled."""
+    corners = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    path = tmp_path / "cube.obj"
+    path.write_text(corners + "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n")
+    return path
+
+
+def test_of_meshes_with_few_vertices_it_is_told_that_these_alone_are_read(capsys, cube, calls, tmp_path):
+    said = f"{cube} is a mesh: its vertices alone are read, and they are few for its shape: from face to face it turns "
+    said += "by 90 degrees; subdivide it, or give points sampled all over its faces"
+    status, out, err = run(capsys, "reconstruct", cube, "-o", tmp_path / "out", "--json")
+    assert (status, err) == (0, f"warning: {said}\n")
+    assert json.loads(out)["warnings"] == [said]
+    assert REPORT["warnings"] == []
+    assert run(capsys, "info", cube)[1].endswith(f"\n{said}\n")
+    assert json.loads(run(capsys, "info", cube, "--json")[1])["warnings"] == [said]
+
+
 def test_options_are_taken_as_the_settings_spell_them(capsys, scan, calls, tmp_path):
     for name in ("--memory_limit", "--memory-limit"):
         assert run(capsys, "reconstruct", scan, "-o", tmp_path, name, "640")[0] == 0
