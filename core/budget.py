@@ -39,6 +39,7 @@ _CORE = 15.0  # MiB that each core beyond two holds in chunks
 # is worked out at the nodes next to the surface, as many for each squared cell of it however far its samples are apart;
 # in a band at more of them.
 _FIXED, _SAMPLE, _NOISY_SAMPLE, _NODE = 0.35, 1.0e-4, 1.5e-4, 1.0e-7
+_BY_ENERGY, _BY_POISSON = 9.0e-4, 6.0e-7  # more for a sample with that solver, for a node with that integration
 _FIELD, _BAND_FIELD, _MESHES = 1.4e-5, 6.5e-5, 2.2e-5  # for a squared cell of the surface
 _CROWDED = {"none": 0.0, "double": 1.0, "single": 1.7, "both": 1.7, "signed": 1.7}  # times the work, by that share
 _LOOKED_AT, _NEIGHBOURS = 500, 24  # samples, and those nearest to each
@@ -60,18 +61,21 @@ class Estimate:
 def estimate_cost(
     spacing: np.ndarray, grid: Grid, settings: Settings = Settings(), noisy: bool = False, crowded: float = 0.0
 ) -> Estimate:
-    """Cost of a run over samples with local spacing (n,), in the units of the grid, that are `noisy` or clean. Of the
-    settings the band, the surface and, for the memory, solver, backend and integration count.
+    """Cost of a run over samples with local spacing (n,), in the units of the grid. Of the settings band, surface,
+    denoise, solver and integration count, and for the memory the backend, whose time is taken as NumPy's.
 
-    crowded : share of the samples where sheets run close, see :func:`crowded_share`; counts for clean ones alone
+    noisy   : whether the samples look noisy; counts where `denoise` is "auto"
+    crowded : share of them where sheets run close, see :func:`crowded_share`; counts for clean ones alone
 
     The area of the surface, about the sum of the squared spacings, tells how many nodes lie near it.
     """
     cells, nodes = spacing / grid.spacing, float(np.prod(grid.shape))
-    area = float(np.sum(cells**2))
+    area, noisy = float(np.sum(cells**2)), noisy if settings.denoise == "auto" else settings.denoise > 0
     work = _FIXED + (_SAMPLE + noisy * _NOISY_SAMPLE) * len(spacing) + area * _MESHES * (settings.surface != "none")
     work += area * _FIELD + nodes * _NODE if settings.band is None else area * _BAND_FIELD
     work *= 1 + _CROWDED[settings.surface] * crowded * (not noisy)
+    work += _BY_ENERGY * len(spacing) * (settings.solver == "energy")
+    work += _BY_POISSON * nodes * (settings.integration == "poisson")
     probe, busy = _probe()
     cpu = work * probe / _PROBE
     return Estimate(_CORES * busy * cpu, _memory(len(spacing), area, nodes, settings), cpu)

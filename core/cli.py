@@ -192,10 +192,10 @@ def _parser():
     command.add_argument("--json", action="store_true", help="print the report and the files written as JSON")
     command.set_defaults(run=_reconstruct, command="reconstruct", spelt=command.spelt())
 
-    text = "say what a scan holds, which resolution suits it, and what time and memory a run would take"
+    text = "say what a scan holds, which resolution suits it, and what time and memory a run so set would take"
     command = commands.add_parser("info", help=text, description=text, formatter_class=layout, allow_abbrev=False)
     command.add_argument("scan", metavar="SCAN", type=_path, help=formats)
-    _add_settings(command, {name: options()[name] for name in ("resolution", "band", "surface")})
+    _add_settings(command, options())
     command.add_argument("--json", action="store_true", help="print as JSON")
     command.set_defaults(run=_info, command="info", spelt=command.spelt())
     return parser
@@ -356,7 +356,7 @@ def _summary(report):
 
 
 def _info(given):
-    settings = Settings(resolution=given.resolution, band=given.band, surface=given.surface)
+    settings = Settings(**{name: getattr(given, name) for name in options()})
     points = read_points(given.scan)
     found = look_ahead(points, settings)
     samples, dropped = found.samples, found.cleaning["outliers"]
@@ -406,5 +406,5 @@ def _described(facts):
         f"cell     {facts['grid']['cell']:.3g} at resolution {facts['resolution']}, a grid of {shape} nodes{band}\n"
         f"suits    resolution {facts['suited_resolution']}, at which points are {SUITED:g} cells apart\n"
         f"run      about {cost['seconds']:.0f} s and {cost['memory_mb']:.0f} MiB; {cost['cpu_seconds']:.0f} s of the "
-        f"processor{', as it looks noisy' if facts['noisy'] else ''}"
+        f"processor{'; points look noisy' if facts['noisy'] else ''}"
     )

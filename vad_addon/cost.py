@@ -37,9 +37,8 @@ class Points:
 
     def cost(self, settings: Settings) -> list[str]:
         """Lines on these points and on the time and memory that `settings` would take."""
-        noisy = self.noisy if settings.denoise == "auto" else settings.denoise > 0
         grid = fit_grid(self.corners, settings.resolution)
-        estimate = estimate_cost(self.spacing, grid, settings, noisy, self.crowded)
+        estimate = estimate_cost(self.spacing, grid, settings, self.noisy, self.crowded)
         return [
             f"{len(self.spacing):,} points, {np.median(self.spacing):.3g} apart",
             f"Suits: resolution {self.suited}",

@@ -56,7 +56,15 @@ def test_memory_is_what_a_run_takes_within_two_fifths(samples, settings):
     assert taken / 1.4 < estimated < 1.4 * taken
 
 
-@pytest.mark.parametrize(("samples", "settings"), [(8000, {}), (1500, {"surface": "both"}), (4000, {"band": 4.0})])
+@pytest.mark.parametrize(
+    ("samples", "settings"),
+    [
+        (8000, {}),
+        (1500, {"surface": "both"}),
+        (4000, {"band": 4.0}),
+        (3000, {"solver": "energy", "backend": "numpy", "surface": "none"}),
+    ],
+)
 def test_processor_time_is_what_a_run_takes_within_a_factor_of_three(samples, settings):
     """In the median of three runs: other work on the machine may slow the probe, or the run."""
     settings, shares = Settings(resolution=96, denoise=0, **settings), []
@@ -109,6 +117,20 @@ def test_noise_costs(monkeypatch):
     moved = points + np.random.default_rng(0).normal(size=points.shape) * 0.03
     assert not looks_noisy(points, spacing)
     assert looks_noisy(moved, local_spacing(moved))
+
+
+@pytest.mark.parametrize(("denoise", "looks", "counts"), [("auto", True, True), (0.2, False, True), (0.0, True, False)])
+def test_noise_that_is_left_costs_nothing(monkeypatch, denoise, looks, counts):
+    monkeypatch.setattr("core.budget._probe", lambda: (0.004, 1.0))
+    grid, spacing, settings = fit_grid(POINTS, 64), local_spacing(POINTS), Settings(resolution=64, denoise=denoise)
+    found, noisy = (estimate_cost(spacing, grid, settings, noisy=looks), estimate_cost(spacing, grid, noisy=counts))
+    assert found.cpu_seconds == noisy.cpu_seconds
+
+
+@pytest.mark.parametrize("dear", [{"solver": "energy"}, {"integration": "poisson"}])
+def test_solver_and_integration_cost(monkeypatch, dear):
+    monkeypatch.setattr("core.budget._probe", lambda: (0.004, 1.0))
+    assert cost(POINTS, 96, **dear)[0].cpu_seconds > 1.3 * cost(POINTS, 96)[0].cpu_seconds
 
 
 def test_sheets_that_run_close_cost(monkeypatch):

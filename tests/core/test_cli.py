@@ -490,6 +490,14 @@ def test_info_knows_of_the_band(capsys, scan):
     assert "set band" in refused(capsys, "info", scan, "--resolution", 1024)
 
 
+def test_info_is_of_a_run_so_set(capsys, scan):
+    """An option of `reconstruct` is one here, too."""
+    asked = "info", scan, "--json", "--surface", "none"
+    plain, dear = (json.loads(run(capsys, *asked, *more)[1]) for more in ([], ["--integration", "poisson"]))
+    assert dear["estimate"]["memory_mb"] > plain["estimate"]["memory_mb"] + 10
+    assert "offset is 9;" in refused(capsys, "info", scan, "--offset", 9)
+
+
 def test_info_counts_and_measures(capsys, tmp_path):
     """A 20 x 10 lattice of step 0.5 with two repeated points and one that is not finite."""
     x, y = np.meshgrid(np.arange(20), np.arange(10))
