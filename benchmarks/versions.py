@@ -19,5 +19,5 @@ def versions(libraries: Iterable[str]) -> dict[str, str]:
 
 
 def listed(found: dict[str, str]) -> str:
-    """These as text."""
-    return ", ".join(f"{name} {number}" for name, number in found.items())
+    """These as a sentence, without its end."""
+    return "Measured with " + ", ".join(f"{name} {number}" for name, number in found.items())
