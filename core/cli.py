@@ -247,10 +247,10 @@ def _reconstruct(given):
         raise InputError(f"{given.output} is to be a folder, in which files are named after the scan; give its name")
     folder = writable_folder(given.output)
     _spare(given.scan, digest, folder, given.arrays)
+    missed = _missed(given.scan, points)  # the scan may be gone after the run
     with _progress() as progress:
         result = reconstruct(points, settings, progress=progress)
-    said = [*result.report["warnings"], *_missed(given.scan, points)]
-    result = replace(result, report={**result.report, "warnings": said})
+    result = replace(result, report={**result.report, "warnings": [*result.report["warnings"], *missed]})
     report = _write(result, carried, folder, given.scan, digest, given.gradient, given.arrays)
     for warning in report["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)

@@ -33,10 +33,11 @@ class Faces:
     def of(cls, points: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -> "Faces":
         """Those between points (n,3) float64, whose areas and normals are found by Newell's sums."""
         first = np.cumsum(sizes) - sizes
-        away = points[corners] - np.repeat(points[corners[first]], sizes, axis=0)
-        swept = 0.5 * np.add.reduceat(np.cross(away, away[_following(sizes)]), first) if len(sizes) else away
-        areas = lengths(swept.T)
-        return cls(len(points), corners, sizes, areas, swept / np.where(areas > 0, areas, 1.0)[:, None])
+        with np.errstate(over="ignore", invalid="ignore"):  # of points as far apart no run is made
+            away = points[corners] - np.repeat(points[corners[first]], sizes, axis=0)
+            swept = 0.5 * np.add.reduceat(np.cross(away, away[_following(sizes)]), first) if len(sizes) else away
+            areas = lengths(swept.T)
+            return cls(len(points), corners, sizes, areas, swept / np.where(areas > 0, areas, 1.0)[:, None])
 
     def turn(self) -> float:
         """By how much two faces turn at an edge that they share, degrees, median, whichever way they are wound."""
@@ -74,4 +75,6 @@ def missed_by_vertices(faces: Faces, sampled: str, refined: str) -> str:
     if areas[large].sum() > _SHARE * areas.sum():
         return f"much of its area lies on faces far larger than these are apart: {sampled}"
     turn = faces.turn() if faces.count <= MANY else 0.0
-    return f"they are few for its shape: from face to face it turns by {turn:.0f} degrees; {refined}" * (turn > _SHARP)
+    if turn > _SHARP:
+        return f"they are few for its shape: from face to face it turns by {turn:.0f} degrees; {refined}"
+    return ""

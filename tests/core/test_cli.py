@@ -568,6 +568,12 @@ def test_of_meshes_with_few_vertices_it_is_told_that_these_alone_are_read(capsys
     assert json.loads(run(capsys, "info", cube, "--json")[1])["warnings"] == [said]
 
 
+def test_a_scan_that_is_gone_after_the_run_has_its_results(capsys, cube, calls, tmp_path, monkeypatch):
+    monkeypatch.setattr(cli, "_progress", lambda before=cli._progress: cube.unlink() or before())
+    assert run(capsys, "reconstruct", cube, "-o", tmp_path / "out")[0] == 0
+    assert "cube_double.ply" in os.listdir(tmp_path / "out")
+
+
 def test_options_are_taken_as_the_settings_spell_them(capsys, scan, calls, tmp_path):
     for name in ("--memory_limit", "--memory-limit"):
         assert run(capsys, "reconstruct", scan, "-o", tmp_path, name, "640")[0] == 0

@@ -60,6 +60,10 @@ def test_few_vertices_are_told_and_how_it_helps():
     assert not told(faces_of(*patch(10)))
 
 
+def test_faces_too_large_for_powers_of_distances_are_no_trouble():
+    assert not told(faces_of(1e300 * np.eye(3), [[0, 1, 2]] * 3))
+
+
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 def test_the_unit_is_of_no_matter(scale):
     points, faces = patch(3, np.radians(50))
